@@ -7,7 +7,7 @@ has its thresholds and delays there, action and class here. None knows the law.
 
 from typing import Annotated, Literal
 
-from pydantic import Field
+from pydantic import AfterValidator, Field
 
 from config.loading import Fraction, NonNegative, Schema, between
 
@@ -52,10 +52,25 @@ class TravelDeviation(Monitor):
     delay_s: NonNegative = 10.0
 
 
-class FrozenSensor(Monitor):
-    """A position the same to the digit, inside the travel, while the pressure changes by a share of its span."""
+def _times_what_it_needs(threshold: float) -> float:
+    """Return a threshold in times of what the valve needs; once it was a share of the pressure span, below 1.
 
-    threshold: NonNegative = 0.5
+    Raises:
+        ValueError: it is neither 0 nor at least 1.
+    """
+    if 0.0 < threshold < 1.0:
+        raise ValueError(
+            "threshold is in times of the pressure that the valve is known to need, not a share of the span: "
+            f"allowed are 0 (not watched) and 1 upward, got {threshold:g}"
+        )
+    return threshold
+
+
+class FrozenSensor(Monitor):
+    """A position the same to the digit, inside the travel, under so many times the pressure that the valve needs."""
+
+    threshold: Annotated[NonNegative, AfterValidator(_times_what_it_needs)] = 1.25
+    delay_s: NonNegative = 0.2
     action: Literal["alarm", FaultActionName] = "hold"
     ne107: Ne107Letter = "F"
 

@@ -30,15 +30,17 @@ from positioner.control.cutoffs import HIGH, WITHIN, sent_to_m
 from positioner.control.excitation import NOTHING, ActiveExcitation, climbed, excitation_after
 from positioner.control.identifying import estimates_tested, identify
 from positioner.control.laws.boundary import Law, Seen
-from positioner.control.monitors import MonitorMemory, after_cycle
+from positioner.control.monitors import Asked, MonitorMemory, after_cycle
 from positioner.control.played_experiment import PlayedExperiment, Surroundings, experiment_after
 from positioner.control.pressure_clamp import clamped
 from positioner.control.pressure_path import PathMemory, long_held
 from positioner.control.reference import Reference
 from positioner.control.requests import Requests
+from positioner.control.rest_band import rest_band
 from positioner.control.restoration import Restoration
 from positioner.control.sample import Sample
 from positioner.control.settings import Settings
+from positioner.control.staircase_excitation import Staircase
 from positioner.control.states import Situation, law_inhibit_reason, state_in
 from positioner.control.supervision import NO_FAULT, SupervisionMemory, supervise, usable
 from positioner.control.valve_knowledge import ValveKnowledge, known
@@ -246,7 +248,7 @@ def _supervised(now: Now) -> tuple[MonitorMemory, SupervisionMemory]:
         now.stem_m,
         memory.command_pa,
         _sent_to_m(now),
-        faulty=memory.supervision.fault is not NO_FAULT,
+        _asked(now),
     )
     return monitoring, supervise(
         memory.supervision,
@@ -256,6 +258,25 @@ def _supervised(now: Now) -> tuple[MonitorMemory, SupervisionMemory]:
         settings.limits,
         good=now.stem_m is not None,
         monitored=monitoring.fault_among(settings.monitoring) if monitoring.holding else NO_FAULT,
+    )
+
+
+def _asked(now: Now) -> Asked:
+    """Return who commands, and what is known of what the stem needs; S3 and an experiment find that out."""
+    memory, excitation = now.memory, now.memory.excitation
+    signal = None if excitation is None or excitation.ended else excitation.signal
+    tried = signal is not None or memory.experiment.commands or memory.restoration.provisional
+    ratios = None if tried else memory.applied.ratios
+    allowed_pa = 0.0
+    if isinstance(signal, Staircase) and now.settings.staircase is not None:
+        allowed_pa = signal.most_pa(now.settings.staircase)
+    return Asked(
+        faulty=memory.supervision.fault is not NO_FAULT,
+        by_law=memory.state in FOLLOWING,
+        pressure_pa=now.sample.pressure_pa,
+        band=rest_band(memory.monitoring.band, ratios, now.statics, now.settings.limits.stroke_m),
+        allowed_pa=allowed_pa,
+        answers_s=now.statics.detector.answers.longest_s,
     )
 
 

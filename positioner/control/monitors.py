@@ -1,7 +1,7 @@
 """Monitors of supervision: conditions of stem, command and cycle that must not hold for longer than a delay.
 
     travel deviation   |r - x| > threshold * stroke                    in automatic, outside S3
-    frozen sensor      x the same, |u - u_0| > threshold * span        u_0 when x last changed; x inside the travel
+    frozen sensor      x the same to the digit, u where no stem rests  by what the valve needs; x inside the travel
     position rate      |x - x_before| / (t - t_before) > threshold * stroke
     saturation         u within threshold * span of a limit            x inside the travel
     overrun            t - t_before > threshold * period               in real time
@@ -9,6 +9,14 @@
 
 t on the clock of the cycle. Nothing here knows the law. An alarm ends with its condition; a fault is latched by
 `supervision`.
+
+Where no stem rests is where a valve that has been identified needs no more (`rest_band`): in automatic
+
+    u, and the measured pressure, outside [p_low(x), p_high(x)]
+
+otherwise, for by hand the stem may be anywhere in its band, |u - u_0| > p_high - p_low, u_0 when x last changed; and
+where nothing is known, half of what the pressure limits allow. The time for which that holds adds up as long as x is
+the same, for a law pushes one way and the other: to the delay, and to five times as long as the stem takes to answer.
 """
 
 from dataclasses import dataclass
@@ -18,9 +26,16 @@ from typing import NamedTuple
 from config.codes import Fault
 from config.daemon_file import DaemonFile
 from config.supervision_table import FaultActionName
+from positioner.control.rest_band import RestBand
 
 ENDS = 0.02
 """Share of the stroke from each end of the travel: there a stem may well stand, whatever the pressure."""
+NOTHING_KNOWN = 0.5
+"""Of what the pressure limits allow: so much may a stem need of which nothing is known."""
+ACTUATOR = 0.1
+"""Of what the pressure limits allow: a measured pressure so near the command in force is that of the actuator."""
+ANSWERS, UNKNOWN_S = 5.0, 1.0
+"""Times as long as the stem takes to answer; where that is not known yet, s."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -37,14 +52,19 @@ class MonitorSettings:
     """The monitors in the order of their faults, and the bounds of their conditions; infinite where one is off.
 
     Attributes:
-        deviation_m, frozen_pa, rate_m_per_s, overrun_s, rate_pa_per_s: beyond which a condition holds.
+        deviation_m, rate_m_per_s, overrun_s, rate_pa_per_s: beyond which a condition holds.
+        frozen_at: times of what the valve needs; infinite: it is not watched.
+        frozen_s: for how long in all.
+        span_pa: that the pressure limits allow.
         low_pa, high_pa: outside which the command is saturated.
         low_m, high_m: away from both ends of the travel a stem is between these.
     """
 
     monitors: tuple[MonitorLimits, ...]
     deviation_m: float
-    frozen_pa: float
+    frozen_at: float
+    frozen_s: float
+    span_pa: float
     rate_m_per_s: float
     overrun_s: float
     rate_pa_per_s: float
@@ -70,11 +90,17 @@ class MonitorSettings:
         near_pa = table.saturation.threshold * span_pa or -inf
         return cls(
             monitors=tuple(
-                MonitorLimits(fault, each.delay_s, None if each.action == "alarm" else each.action)
+                MonitorLimits(
+                    fault,
+                    0.0 if fault is Fault.FROZEN_SENSOR else each.delay_s,
+                    None if each.action == "alarm" else each.action,
+                )
                 for fault, each in monitors
             ),
             deviation_m=table.travel_deviation.threshold * stroke_m or inf,
-            frozen_pa=table.frozen_sensor.threshold * span_pa or inf,
+            frozen_at=table.frozen_sensor.threshold or inf,
+            frozen_s=table.frozen_sensor.delay_s,
+            span_pa=span_pa,
             rate_m_per_s=table.position_rate.threshold * stroke_m or inf,
             overrun_s=table.overrun.threshold * period_s or inf,
             rate_pa_per_s=table.command_rate.threshold * span_pa or inf,
@@ -84,6 +110,28 @@ class MonitorSettings:
             high_m=(1.0 - ENDS) * stroke_m,
         )
 
+
+class Asked(NamedTuple):
+    """Who commands, and what is known of what the stem needs.
+
+    Attributes:
+        faulty: whether a fault is latched: then a safe action commands.
+        by_law: whether the law commands.
+        pressure_pa: as measured.
+        band: where the stem rests by what is known; None: that is not known, or is being found out.
+        allowed_pa: what an excitation that finds it out allows itself.
+        answers_s: how long the stem takes to answer a command; 0: that is not known.
+    """
+
+    faulty: bool = False
+    by_law: bool = False
+    pressure_pa: float = inf
+    band: RestBand | None = None
+    allowed_pa: float = 0.0
+    answers_s: float = 0.0
+
+
+NOBODY = Asked()
 
 NEVER = (inf, inf, inf, inf, inf, inf)
 """No condition holds."""
@@ -99,9 +147,15 @@ class MonitorMemory(NamedTuple):
     position_m: float = inf
     """The last good one, and when; infinite before there was one."""
     unmoved_pa: float = inf
-    """The command when it last changed."""
+    """The command when it last changed, ..."""
+    unmoved_measured_pa: float = inf
+    """... the measured pressure then ..."""
+    unanswered_s: float = 0.0
+    """... and for how long since then no stem rests."""
     command_pa: float | None = None
     """The last seen, while no fault was latched."""
+    band: RestBand | None = None
+    """What the valve is known to need."""
     holding: tuple[Fault, ...] = ()
     """Those whose condition has held for their delay."""
 
@@ -118,8 +172,7 @@ def after_cycle(
     position_m: float | None,
     command_pa: float,
     reference_m: float | None,
-    *,
-    faulty: bool = False,
+    asked: Asked = NOBODY,
 ) -> MonitorMemory:
     """Return what is known after a cycle.
 
@@ -129,8 +182,9 @@ def after_cycle(
         position_m: None in a cycle without a good measurement.
         command_pa: the last given.
         reference_m: where the stem is asked to be; None where nobody asks.
-        faulty: whether a fault is latched: then a safe action commands.
+        asked: who commands, and what is known of what the stem needs.
     """
+    faulty = asked.faulty
     elapsed_s = now_s - memory.seen_s
     overrun = elapsed_s > settings.overrun_s
     before_pa, seen_pa = memory.command_pa, None if faulty else command_pa
@@ -140,18 +194,50 @@ def after_cycle(
         since_s, holding = _held(memory, settings, now_s, (False, False, False, False, overrun, fast))
         return memory._replace(since_s=since_s, seen_s=now_s, command_pa=seen_pa, holding=holding)
     way_m, passed_s = abs(position_m - memory.position_m), now_s - memory.good_s
-    unmoved_pa = memory.unmoved_pa if way_m == 0.0 else command_pa
     inside = settings.low_m < position_m < settings.high_m
+    unmoved_pa, unmoved_measured_pa, unanswered_s = memory.unmoved_pa, memory.unmoved_measured_pa, memory.unanswered_s
+    if way_m != 0.0:
+        unmoved_pa, unmoved_measured_pa, unanswered_s = command_pa, asked.pressure_pa, 0.0
+    elif inside and _unanswered(memory, settings, position_m, command_pa, asked):
+        unanswered_s += passed_s
     conditions = (
         reference_m is not None and abs(reference_m - position_m) > settings.deviation_m,
-        inside and abs(command_pa - unmoved_pa) > settings.frozen_pa,
+        unanswered_s > max(settings.frozen_s, ANSWERS * asked.answers_s or UNKNOWN_S),
         way_m > settings.rate_m_per_s * passed_s > 0.0,
         inside and not settings.low_pa <= command_pa <= settings.high_pa,
         overrun,
         fast,
     )
     since_s, holding = _held(memory, settings, now_s, conditions)
-    return MonitorMemory(since_s, now_s, now_s, position_m, unmoved_pa, seen_pa, holding)
+    return MonitorMemory(
+        since_s,
+        now_s,
+        now_s,
+        position_m,
+        unmoved_pa,
+        unmoved_measured_pa,
+        unanswered_s,
+        seen_pa,
+        asked.band,
+        holding,
+    )
+
+
+def _unanswered(
+    memory: MonitorMemory, settings: MonitorSettings, position_m: float, command_pa: float, asked: Asked
+) -> bool:
+    """Whether no stem rests at a position that has not changed, m, under a command, Pa."""
+    went_pa, measured = abs(command_pa - memory.unmoved_pa), asked.pressure_pa
+    if went_pa == 0.0 or settings.frozen_at == inf:
+        return False
+    if asked.band is None:
+        return went_pa > max(NOTHING_KNOWN * settings.span_pa, asked.allowed_pa)
+    low_pa, high_pa = asked.band.pressures_pa(position_m, settings.frozen_at)
+    if not asked.by_law:
+        return went_pa > high_pa - low_pa
+    if abs(memory.unmoved_measured_pa - memory.unmoved_pa) > ACTUATOR * settings.span_pa:
+        measured = command_pa
+    return max(command_pa, measured) < low_pa or min(command_pa, measured) > high_pa
 
 
 def _held(

@@ -208,9 +208,9 @@ class Staircase:
 
     def unanswered(self, limits: StaircaseLimits) -> bool:
         """Return whether the stem has not answered what has always moved it before, or anything."""
-        return self.highest_pa - self.lowest_pa >= self._most_pa(limits)
+        return self.highest_pa - self.lowest_pa >= self.most_pa(limits)
 
-    def _most_pa(self, limits: StaircaseLimits) -> float:
+    def most_pa(self, limits: StaircaseLimits) -> float:
         """Return the longest way of the level for which the stem may leave it without an answer."""
         going_on_pa = self.most_up_pa if self.direction > 0 else self.most_down_pa
         needed_pa = (going_on_pa if self.slide_m else 0.0) or self.most_turn_pa

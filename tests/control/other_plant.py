@@ -30,7 +30,7 @@ def with_friction(parameters: Parameters, factor: float) -> Parameters:
 
 
 class OtherPlant:
-    """The stem behind a noisy sensor; `sensed` is what becomes of its position, m, at a time, s, before noise."""
+    """The stem behind a noisy sensor; `sensed` is what becomes of what it would show, m, at a time, s."""
 
     sample_counter = 0
     status = 0
@@ -43,7 +43,7 @@ class OtherPlant:
         at_pu: float = 0.5,
         noise_std_m: float = 0.0,
         seed: int = 0,
-        sensed: Callable[[float, float], float] = lambda _time_s, stem_m: stem_m,
+        sensed: Callable[[float, float], float] = lambda _time_s, shown_m: shown_m,
     ) -> None:
         self.stem = Stem(parameters, at_pu * parameters.stroke_m)
         self._period_s, self._noise_std_m, self._sensed = period_s, noise_std_m, sensed
@@ -68,5 +68,5 @@ class OtherPlant:
 
     def _measure(self) -> None:
         noise_m = self._noise_std_m * float(self._rng.standard_normal())
-        self.position_m = self._sensed(1e-6 * self.device_time_us, self.stem.position_m) + noise_m
+        self.position_m = self._sensed(1e-6 * self.device_time_us, self.stem.position_m + noise_m)
         self.pressure_pa = self.stem.pressure_pa

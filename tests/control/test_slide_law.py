@@ -52,6 +52,8 @@ class Loop:
             "control": {"law": "slides", **control},
             "excitation": {"travel_window": (0.3, 0.9)},
             "law": typed,
+            # A stem that a test holds fast shows the same digit, as a frozen sensor does.
+            "supervision": {"frozen_sensor": {"threshold": 0.0}},
         }
         slave = {
             "clock": {"mode": "lockstep", "period_s": period_s},

@@ -1,11 +1,17 @@
 """S3 by a staircase finds a packing that needs more than the spring takes over the stroke, by its own slides."""
 
+from collections.abc import Callable
+
 import pytest
 
 from config.codes import Fault, State
 from config.daemon_file import DaemonFile
+from config.slave_file import SlaveFile
+from config.valve_file import load_valve, shipped_valve
 from drivers.in_memory import Plant
 from positioner.control.controller_memory import Decision
+from sim.slave.simulated_device import Device
+from sim.valve import Valve
 from tests.cases import few_always
 from tests.control.other_plant import SEED_LIKE, OtherPlant, with_friction
 from tests.control.virtual_loop import VirtualLoop
@@ -33,12 +39,25 @@ def identified(plant: Plant, maximum_pa: float) -> Decision:
     return loop.decision
 
 
+def seed_valve(factor: float) -> Plant:
+    file = load_valve(shipped_valve("seed"))
+    valve = Valve.from_file(file)
+    valve.change(coulomb_n=factor * file.valve.coulomb_n, static_n=factor * file.valve.static_n)
+    valve.rest_at(0.5 * STROKE_M, 0.5 * STROKE_M * file.valve.spring_n_per_m / file.valve.diaphragm_area_m2)
+    slave = {"clock": {"mode": "lockstep", "period_s": PERIOD_S}, "sensor": {"noise_std_m": 1e-4 * STROKE_M, "seed": 1}}
+    return Device(valve, SlaveFile.model_validate(slave), {})
+
+
+def other_valve(factor: float) -> Plant:
+    return OtherPlant(with_friction(SEED_LIKE, factor), PERIOD_S, noise_std_m=1e-5)
+
+
+@pytest.mark.parametrize("valve", [seed_valve, other_valve])
 @pytest.mark.parametrize("maximum_pa", [140e3, 420e3])
 @pytest.mark.parametrize("factor", few_always([2.0, 1.0, 1.5], 1))
-def test_friction_that_has_doubled_is_found_on_another_plant(factor: float, maximum_pa: float) -> None:
+def test_friction_that_has_doubled_is_found(factor: float, maximum_pa: float, valve: Callable[[float], Plant]) -> None:
     """The first turn needs F_c + F_s: 97 kPa of the doubled packing, where the spring takes 83 over the stroke."""
-    plant = OtherPlant(with_friction(SEED_LIKE, factor), PERIOD_S, noise_std_m=1e-5)
-    found = identified(plant, maximum_pa)
+    found = identified(valve(factor), maximum_pa)
     assert (found.fault, found.applied.count) == (Fault.NONE, 1)
     assert found.applied.ratios is not None
     friction_pa = factor * SEED_LIKE.coulomb_n / SEED_LIKE.area_m2
