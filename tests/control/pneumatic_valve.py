@@ -45,14 +45,17 @@ class PneumaticValve:
 class Loop(VirtualLoop):
     """The valve under the daemon's own law."""
 
-    def __init__(self, measured: Callable[[float], float] = lambda actuator_pa: actuator_pa) -> None:
+    def __init__(
+        self, measured: Callable[[float], float] = lambda actuator_pa: actuator_pa, law: str = "slides"
+    ) -> None:
         file = DaemonFile.model_validate(
             {
                 "valve": {"stroke_m": STROKE_M},
                 "cycle": {"pace": "device", "period_s": PERIOD_S},
                 "pressure": {"maximum_pa": 140e3},
                 "safety": {"stale_after_s": 4 * PERIOD_S},
-                "control": {"law": "slides"},
+                "control": {"law": law},
+                "excitation": {"kind": "staircase"},
             }
         )
         self.valve = PneumaticValve(measured)

@@ -82,3 +82,21 @@ def test_a_pressure_sensor_that_stands_still_does_not_stop_the_stem() -> None:
     for reference_pu in (0.3, 0.35, 0.8, 0.79):
         assert abs(loop.step_to(reference_pu, 20.0)) < 1e-3
         assert loop.why is InhibitReason.NOTHING
+
+
+@pytest.mark.parametrize(("from_pu", "to_pu"), [(0.8, 0.5), (0.3, 0.6)])
+def test_the_seeds_law_returns_to_its_balance_whichever_way_the_stem_comes_back(from_pu: float, to_pu: float) -> None:
+    """Its command hung on the last difference of the reference: a stem that came back the other way was 15 % off."""
+    loop = Loop(law="seed").identified()
+    loop.step_to(from_pu, 20.0)
+    before = loop.step_to(to_pu, 20.0)
+    loop.valve.supply_pa = 30e3
+    loop.cycles(30.0)
+    assert loop.error_at(to_pu) < -0.2
+    assert ne107_condition(loop.decision, loop.health).status is Ne107Status.OUT_OF_SPECIFICATION
+    loop.valve.supply_pa = GOOD_PA
+    loop.cycles(30.0)
+    assert abs(loop.error_at(to_pu)) <= max(2e-3, abs(before))
+    held_pa = loop.decision.command_pa
+    loop.cycles(30.0)
+    assert loop.decision.command_pa == held_pa

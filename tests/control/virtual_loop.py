@@ -27,7 +27,7 @@ class VirtualLoop:
         self.plant = plant
         self.stroke_m, self.period_s = file.valve.stroke_m, file.cycle.period_s
         self.cycle = virtual_cycle(file, plant, Requests(mode=Mode.AUTOMATIC, mode_writes=1))
-        self.health = Health(HealthSettings.of(file.health, self.stroke_m))
+        self.cycle.health = self.health = Health(HealthSettings.of(file.health, self.stroke_m))
 
     def cycles(self, for_s: float) -> None:
         for _ in range(round(for_s / self.period_s)):

@@ -89,7 +89,11 @@ class Health:
         self._pressed_s = inf
         """Since when the stem is pressed onto a stop."""
         self.away_m = 0.0
-        """From stem to where it is sent, m; 0 where nobody asks, and on its way onto a stop."""
+        """From stem to where it is sent, m; 0 where nobody asks, and on its way onto a stop, ..."""
+        self.left_away_m = 0.0
+        """... and the same where it has stood still for the time in which moves settle: it is not on its way."""
+        self._stood = (nan, nan, inf)
+        """Where, for which reference, and since when: m, m, s."""
 
     @classmethod
     def idle(cls, stroke_m: float) -> "Health":
@@ -136,6 +140,14 @@ class Health:
         under_way = self._pressed_s <= sample.now_s < self._pressed_s + self.settings.settle_s
         asked_m = sent_to_m(decision.cut_off, decision.reference_m, sample.position_m)
         self.away_m = abs(sample.position_m - asked_m) if follows and not under_way else 0.0
+        self.left_away_m = self.away_m if self._stands(sample, decision.reference_m) else 0.0
+
+    def _stands(self, sample: Sample, reference_m: float) -> bool:
+        """Whether the stem has stood still under a reference, m, for as long as moves settle."""
+        at_m, asked_m, since_s = self._stood
+        if not (reference_m == asked_m and abs(sample.position_m - at_m) <= self.settings.dead_band_m):
+            self._stood, since_s = (sample.position_m, reference_m, sample.now_s), sample.now_s
+        return sample.now_s - since_s >= self.settings.settle_s
 
     def _take(self, applied: Applied) -> None:
         self._applied = applied

@@ -1,8 +1,7 @@
 """The seed's law: one pressure for each reference, in open loop.
 
-    seed_law    its equation
-
-It has no settings of its own, and remembers its command alone.
+seed_law    its equation
+course      in which direction the stem comes to its reference
 """
 
 from positioner.control.laws.seed.seed_law import SeedSettings as Settings
