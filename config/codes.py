@@ -71,7 +71,7 @@ class Fault(Code):
     NO_REPLY = 1, "no reply"
     STALE = 2, "stale"
     IMPLAUSIBLE = 3, "implausible"
-    DEVICE = 4, "device"
+    DEVICE = 4, "the device said that it is unfit"
     RESTARTED = 5, "device restarted, or missed commands: it is back with another than the last one it was given"
     DCS_SILENT = 6, "DCS silent"
     STALLED = 7, "the daemon stood still"

@@ -4,7 +4,7 @@
 
 p_0, p_1 bench range, Pa; A effective diaphragm area, m^2; f friction, the pressure between opening and closing as a
 share of the range; r break-away over sliding friction. m and F_v are no data sheet's: m goes with the
-area, F_v is 15 ms k_s.
+area, F_v is 15 ms k_s. The travel ends at 0 and at the stroke, at stops 2000 times as stiff as the spring.
 """
 
 from dataclasses import dataclass
@@ -18,6 +18,10 @@ KG_PER_M2 = 8.0 / 0.07
 """Plate, stem and plug: 8 kg go with 700 cm2."""
 DAMPING_S = 15e-3
 """F_v/k_s: the air that a diaphragm pushes in and out."""
+STOP_STIFFNESS, STOP_DAMPING = 2000.0, 16.0
+"""Of seat and upper stop, over those of spring and stem."""
+STIFFNESS_N_PER_M, DAMPING_NS_PER_M = (1e5, 1e9), (0.0, 1e5)
+"""What such a contact may have (`sim.effects.end_stop`)."""
 STRIBECK_M_PER_S = 5e-4
 DEADZONE = 0.5
 ALLOWED = {"area_cm2": 1e5, "stroke_mm": 1500.0, "friction_percent": 90.0, "breakaway_ratio": 10.0, "mass_kg": 1e4}
@@ -86,9 +90,19 @@ def from_data_sheet(sheet: DataSheet) -> tuple[ValveFile, list[str], list[str]]:
         stroke_m=_rounded(stroke_m),
     )
     preload = EffectTable.model_validate({"name": "preload", "force_n": _rounded(closed_pa * area_m2)})
+    stops = EffectTable.model_validate(
+        {
+            "name": "end_stop",
+            "lower_m": 0.0,
+            "travel_m": valve.stroke_m,
+            "stiffness_n_per_m": _within(STOP_STIFFNESS * valve.spring_n_per_m, STIFFNESS_N_PER_M),
+            "damping_ns_per_m": _within(STOP_DAMPING * valve.viscous_ns_per_m, DAMPING_NS_PER_M),
+        }
+    )
     given = [
         f"spring {valve.spring_n_per_m:g} N/m: {span_n:.6g} N over {sheet.stroke_mm:g} mm",
         f"preload {closed_pa * area_m2:.6g} N: {sheet.range_bar[0]:g} bar on {sheet.area_cm2:g} cm2",
+        f"stops at 0 and {sheet.stroke_mm:g} mm",
     ]
     friction = f"sliding friction {valve.coulomb_n:g} N: {percent:g} % of the range between opening and closing"
     breakaway = f"break-away friction {valve.static_n:g} N: {ratio:g} times that"
@@ -98,10 +112,14 @@ def from_data_sheet(sheet: DataSheet) -> tuple[ValveFile, list[str], list[str]]:
         *([breakaway] if sheet.breakaway_ratio is None else []),
         *([f"{mass}: 8 kg go with 700 cm2"] if sheet.mass_kg is None else []),
         f"damping {valve.viscous_ns_per_m:g} N s/m: F_v/k_s = {1e3 * DAMPING_S:g} ms",
-        f"Stribeck velocity {STRIBECK_M_PER_S:g} m/s; no stops at the ends of the travel",
+        f"Stribeck velocity {STRIBECK_M_PER_S:g} m/s; stops {STOP_STIFFNESS:g} times as stiff as the spring",
     ]
     given += [each for each in (friction, breakaway, mass) if not any(one.startswith(each) for one in assumed)]
-    return ValveFile(valve=valve, effect=(preload,) if closed_pa > 0.0 else ()), given, assumed
+    return ValveFile(valve=valve, effect=(preload, stops) if closed_pa > 0.0 else (stops,)), given, assumed
+
+
+def _within(value: float, allowed: tuple[float, float]) -> float:
+    return _rounded(min(max(value, allowed[0]), allowed[1]))
 
 
 def _rounded(value: float) -> float:

@@ -13,6 +13,7 @@ A B C D, A the most significant:
 
 import math
 import struct
+import sys
 from collections.abc import Sequence
 from dataclasses import dataclass
 from typing import Literal
@@ -30,6 +31,9 @@ LETTER: dict[WireType, str] = {
     "float64": "d",
 }
 """Of the module `struct`, for each type."""
+
+
+LARGEST_FLOAT32 = (2 - 2**-23) * 2.0**127
 
 
 @dataclass(frozen=True, slots=True)
@@ -50,6 +54,16 @@ class Format:
     def is_float(self) -> bool:
         """Whether the value is a floating-point number."""
         return self.type in ("float32", "float64")
+
+    @property
+    def limits(self) -> tuple[float, float]:
+        """The least and the greatest value."""
+        if self.type == "float32":
+            return -LARGEST_FLOAT32, LARGEST_FLOAT32
+        if self.type == "float64":
+            return -sys.float_info.max, sys.float_info.max
+        bits = 16 * self.words
+        return (-(1 << bits - 1), (1 << bits - 1) - 1) if self.type.startswith("int") else (0, (1 << bits) - 1)
 
     def holds(self, value: float) -> bool:
         """Return whether a value is whole where it must be."""

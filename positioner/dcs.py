@@ -8,6 +8,8 @@ from collections.abc import Callable, Mapping, Sequence
 from types import TracebackType
 from typing import Self
 
+from pymodbus.constants import ExcCodes
+
 from config.codes import ExperimentState, Fault, InhibitReason, Refusal, State
 from config.errors import CommandFailed, InputError
 from config.modbus_map import MOST_REGISTERS
@@ -119,7 +121,23 @@ class Dcs:
                 self._client.write_registers(run[0].address, words)
             except ClientError as error:
                 asked = ", ".join(f"{each.name} = {values[each.name]:g}" for each in run)
-                raise DcsError(f"{self._where}: {asked} was refused: {_in_words(error)}") from None
+                why = self._why_refused(values, error) or _in_words(error)
+                raise DcsError(f"{self._where}: {asked} was refused: {why}") from None
+
+    def _why_refused(self, values: Mapping[str, float], error: ClientError) -> str:
+        """Return what the daemon's registers say of why a write was refused as busy; empty where they do not."""
+        if not isinstance(error, Refused) or error.code != ExcCodes.DEVICE_BUSY:
+            return ""
+        try:
+            now = self.get_all("locked_out", "fault")
+        except DcsError:
+            return ""
+        if now["locked_out"]:
+            return "the local switch locks out all writes"
+        if "mode" in values and now["fault"]:
+            fault = Fault(int(now["fault"])).text
+            return f"a fault is latched ({fault}): positioner set acknowledge 1, once its cause is gone"
+        return ""
 
     def set_and_read_back(self, name: str, value: float) -> float:
         """Write a register; return what it reads once the daemon has decided on it.

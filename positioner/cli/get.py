@@ -21,6 +21,7 @@ def run(arguments: argparse.Namespace) -> int:
 
     from config.json_value import json_value
     from config.registers import BY_NAME, register_named
+    from positioner.observer.words import in_words
 
     names = arguments.names or list(BY_NAME)
     for name in names:
@@ -29,11 +30,10 @@ def run(arguments: argparse.Namespace) -> int:
         values = dcs.get_all(*names)
     if arguments.json:
         print(json.dumps(json_value(values)))
-    elif len(values) == 1:
-        print(f"{values[names[0]]:.9g}")
-    else:
-        width = max(map(len, names))
-        for name, value in values.items():
-            unit = BY_NAME[name].unit
-            print(f"{name:{width}}  {value:.9g}{'' if unit == '1' else ' ' + unit}")
+        return 0
+    width = max(map(len, names)) if len(names) > 1 else 0
+    for name, value in values.items():
+        unit = BY_NAME[name].unit if width and BY_NAME[name].unit != "1" else ""
+        parts = (f"{name:{width}} " if width else "", f"{value:.9g}", unit, in_words(name, value, values))
+        print(" ".join(each for each in parts if each))
     return 0

@@ -6,6 +6,7 @@ from dataclasses import dataclass
 
 from config.codes import ExperimentState, Fault, Mode, State
 from positioner.observer.freshness import news_within_s
+from positioner.observer.words import code_text
 
 IDENTIFY_READS = ("mode", "fault", "sample_age", "period", "state", "experiment_state")
 """Registers that decide."""
@@ -32,7 +33,8 @@ def identify_permissives(values: Mapping[str, float]) -> tuple[Permissive, ...]:
         Permissive(
             "no fault is latched",
             values.get("fault") == Fault.NONE,
-            "a fault is latched: positioner set acknowledge 1, once its cause is gone",
+            f"a fault is latched ({code_text('fault', values.get('fault', math.nan))}): "
+            "positioner set acknowledge 1, once its cause is gone",
         ),
         Permissive(
             "the measurement is of now",

@@ -87,15 +87,34 @@ def ne107_causes(low: float, high: float = 0) -> list[str]:
     return [code_text("ne107_cause", bit + 1) for bit in range(number.bit_length()) if number >> bit & 1]
 
 
-def device_status(word: float) -> str:
-    """Return what the device says of itself.
+def device_status(word: float, fault: float = Fault.NONE) -> str:
+    """Return what the device says of itself; beside the fault by which it said otherwise before, that this is over.
 
     >>> device_status(0), device_status(6)
     ('healthy', 'sensor fault, not ready')
+    >>> device_status(0, Fault.DEVICE)
+    'healthy again; its fault is latched until it is acknowledged'
     """
     number = int(word) if math.isfinite(word) else 0
     said = [(each.name or "").lower().replace("_", " ") for each in DeviceStatus if number & each]
+    if not said and fault == Fault.DEVICE:
+        return "healthy again; its fault is latched until it is acknowledged"
     return ", ".join(said) or "healthy"
+
+
+def in_words(register: str, value: float, values: Mapping[str, float]) -> str:
+    """Return what a register's number means, among others read with it; empty where it is a number and no more.
+
+    >>> in_words("mode", 2, {}), in_words("b_reason", 0, {}), in_words("position", 0.5, {})
+    ('automatic', 'valid', '')
+    """
+    if register in CODES:
+        return code_text(register, value)
+    if register == "device_status":
+        return device_status(value, values.get("fault", Fault.NONE))
+    if register.endswith("_reason"):
+        return code_text("refusal", value)
+    return ""
 
 
 def estimates_in_words(values: Mapping[str, float]) -> Iterator[EstimateInWords]:

@@ -1,13 +1,14 @@
 """The device as Modbus registers: its map read as one image, written by whole quantities.
 
 The same map is served as holding and as input registers. A read takes one image of the device, so no value is torn;
-registers between two quantities read 0. A write covers whole writable quantities, and all of it is checked before
+registers between two quantities read 0. A measurement that its registers cannot hold saturates, as in any device; what
+counts begins at 0 again. A write covers whole writable quantities, and all of it is checked before
 any of it is obeyed.
 """
 
 import math
 import struct
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from operator import attrgetter
 
 from pymodbus.constants import ExcCodes
@@ -18,6 +19,8 @@ from fieldbus.modbus.layout import layout
 from fieldbus.modbus.register_answers import RegisterError, Table
 from sim.slave.clocks import Clock
 from sim.slave.simulated_device import Device
+
+COUNTED = frozenset({"sample_counter", "device_time_us"})
 
 
 class DeviceRegisters:
@@ -32,9 +35,9 @@ class DeviceRegisters:
     def __init__(self, device: Device, clock: Clock, registers: ModbusMap = SIMULATED_MAP) -> None:
         self._device = device
         self._clock = clock
-        self._places = list(registers.places.values())
+        self._raw = [_raw_of(name, place, registers) for name, place in registers.places.items()]
         self._values = attrgetter(*registers.places)
-        self._layout = layout(self._places)
+        self._layout = layout(registers.places.values())
         self._words = struct.Struct(f">{self._layout.words}H")
         self._writable = {place.address: (name, place) for name, place in registers.places.items() if name in WRITABLE}
 
@@ -49,7 +52,7 @@ class DeviceRegisters:
         if not 0 <= first <= first + count <= self._layout.words:
             raise RegisterError(ExcCodes.ILLEGAL_ADDRESS)
         self._clock.catch_up()
-        raw = [_raw(place, value) for place, value in zip(self._places, self._values(self._device), strict=True)]
+        raw = [raw_of(value) for raw_of, value in zip(self._raw, self._values(self._device), strict=True)]
         return self._words.unpack(self._layout.pack(raw))[first : first + count]
 
     def write(self, address: int, words: Sequence[int], _peer: str) -> None:
@@ -95,8 +98,17 @@ class DeviceRegisters:
         return values
 
 
-def _raw(place: Place, value: float) -> float:
-    """Return the raw number of a value; a broken transmitter's NaN where the registers can say it, else 0."""
-    if not math.isfinite(value):
-        return value if place.is_float else 0
-    return place.raw(value)
+def _raw_of(name: str, place: Place, registers: ModbusMap) -> Callable[[float], float]:
+    """Return what makes the raw number of a quantity's values."""
+    if name in COUNTED and not place.is_float:
+        counted = registers.sample_counter_range if name == "sample_counter" else 1 << 16 * place.format.words
+        return lambda value: place.raw(value) % counted
+    low, high = place.format.limits
+
+    def measured(value: float) -> float:
+        """A broken transmitter's NaN where the registers can say it, else 0."""
+        if not math.isfinite(value):
+            return value if place.is_float else 0
+        return min(max(place.raw(value), low), high)
+
+    return measured

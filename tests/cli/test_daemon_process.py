@@ -1,5 +1,6 @@
 """The daemon as a process against a slave as a process: registers on the wire, faults, safe states, recovery."""
 
+import re
 import signal
 import socket
 import struct
@@ -18,8 +19,9 @@ from config.recording import read_recording
 from config.registers import BY_NAME
 from drivers import driver_for
 from drivers.boundary import Driver
+from positioner.cli.main import main
 from positioner.cli.parts.children import port_in
-from positioner.dcs import Dcs
+from positioner.dcs import Dcs, DcsError
 from tests.children import child, ended, running
 from tests.independent import independent_client, refused_with
 
@@ -135,7 +137,9 @@ def watcher(device_port: int) -> Iterator[Driver]:
 UNTOUCHED = {"communication_timeout_s": None, "communication_action": None}
 
 
-def test_a_device_that_dies_is_a_fault_and_is_taken_up_again_without_a_move(tmp_path: Path) -> None:
+def test_a_device_that_dies_is_a_fault_and_is_taken_up_again_without_a_move(
+    tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
     with ExitStack() as daemon:
         with running("sim", slave_file(tmp_path), "--listen-port", "0") as slave:
             device_port = port_in(slave)
@@ -146,6 +150,13 @@ def test_a_device_that_dies_is_a_fault_and_is_taken_up_again_without_a_move(tmp_
         with running("sim", slave_file(tmp_path, device_port)):
             until(lambda: dcs.get("quality") == 0, "good measurements")
             assert dcs.get("fault") != Fault.NONE, "latched"
+            with pytest.raises(
+                DcsError, match=r"mode = 2 was refused: a fault is latched \(no reply\): .* acknowledge 1"
+            ):
+                dcs.set("mode", Mode.AUTOMATIC)
+            assert main(["get", "fault", "quality", "position_m", "--port", str(port)]) == 0
+            printed = capsys.readouterr().out
+            assert re.fullmatch(r"fault +1 no reply\nquality +0 good\nposition_m +0\.0\d+ m\n", printed)
             dcs.set("acknowledge", 1)
             until(lambda: dcs.get("fault") == Fault.NONE, "the acknowledgement")
             assert dcs.get("command") == pytest.approx(24000.0)

@@ -13,6 +13,7 @@ from config.recording import Recording
 from config.valve_file import load_valve, valve
 from positioner.cli.main import main
 from sim.simulation import simulate
+from sim.valve import Valve
 
 Capture = pytest.CaptureFixture[str]
 
@@ -160,10 +161,23 @@ def test_a_valve_from_a_data_sheet(tmp_path: Path, capsys: Capture) -> None:
     assert made.spring_n_per_m == pytest.approx(shipped.spring_n_per_m)
     assert made.coulomb_n == pytest.approx(shipped.coulomb_n, rel=1e-3)
     assert made.static_n == pytest.approx(shipped.static_n, rel=0.01)
-    assert [each.parameters for each in load_valve(out).effect] == [{"force_n": 1400.0}]
+    preload, stops = load_valve(out).effect
+    assert preload.parameters == {"force_n": 1400.0}
+    assert (stops.name, stops.parameters["lower_m"], stops.parameters["travel_m"]) == ("end_stop", 0.0, 0.04)
     printed = capsys.readouterr().out
     assert "assumed: mass 8 kg" in printed
     assert "from the data sheet: sliding friction" in printed
+
+
+def test_the_stem_of_a_valve_from_a_data_sheet_goes_no_farther_than_its_travel(tmp_path: Path) -> None:
+    """It went 99 mm under the supply, for a travel of 40."""
+    out = tmp_path / "v.toml"
+    words = ["valve", "--area-cm2", "700", "--range-bar", "0.2", "1.0", "--stroke-mm", "40", "-o", str(out)]
+    assert main(words) == 0
+    stem = Valve.from_file(load_valve(out), step_s=1e-5, source=str(out))
+    for pressure_pa, end_m in ((250e3, 0.04), (0.0, 0.0)):
+        stem.advance(pressure_pa, 2.0)
+        assert stem.position_m == pytest.approx(end_m, abs=4e-4)
 
 
 @pytest.mark.parametrize(

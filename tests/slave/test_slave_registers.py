@@ -8,6 +8,7 @@ from typing import Any
 import pytest
 
 from config.modbus_map import SIMULATED_MAP, ModbusMap, Place
+from config.register_format import Format
 from config.slave_file import SlaveFile
 from config.valve_file import shipped_valve
 from fieldbus.modbus.client import ModbusClient
@@ -53,6 +54,27 @@ def bench() -> Bench:
 
 def f32(value: float) -> bytes:
     return struct.pack(">f", value)
+
+
+COARSE = ModbusMap(
+    position_m=Place(address=0, type="int16", scale=1e-7),
+    pressure_pa=Place(address=1, type="uint16"),
+    sample_counter=Place(address=2, type="uint16"),
+    device_time_us=Place(address=3, type="uint16", scale=1000.0),
+    command_pa=Place(address=10, type="uint16", scale=100.0),
+)
+
+
+def test_what_registers_cannot_hold_saturates_and_what_counts_begins_again() -> None:
+    """It was a traceback and exception 4 a request, for ever."""
+    bench = Bench(COARSE, clock={"mode": "lockstep"}, initial={"position_m": 0.03, "pressure_pa": 90e3})
+    for samples, counter, time_ms in ((0, 0, 0), (65_535, 65_535, 65_535), (2, 1, 1)):
+        bench.device.advance(samples)
+        reply = bench.ask(struct.pack(">BHH", 3, 0, 4))
+        assert struct.unpack(">hHHH", reply[2:]) == (32_767, 65_535, counter, time_ms)
+    assert Format("int16").limits == (-32_768, 32_767)
+    assert Format("uint32").limits == (0, 2**32 - 1)
+    assert Format("float32").encode(Format("float32").limits[1]) == [0x7F7F, 0xFFFF]
 
 
 @pytest.mark.parametrize("table", [3, 4])

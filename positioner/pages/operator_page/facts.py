@@ -62,7 +62,11 @@ def status(picture: ValvePicture) -> list[Fact]:
         Fact("service", picture.text("service"), BY_NAME["service"].text),
         *said,
         Fact("measurement", picture.freshness.measurement or picture.text("quality"), BY_NAME["quality"].text),
-        Fact("device", device_status(picture.value("device_status")), BY_NAME["device_status"].text),
+        Fact(
+            "device",
+            device_status(picture.value("device_status"), picture.value("fault")),
+            BY_NAME["device_status"].text,
+        ),
         Fact("CANopen's emergency", _emergency(picture.value("emergency")), BY_NAME["emergency"].text),
         Fact("knowledge from before", picture.text("restored"), BY_NAME["restored"].text),
         Fact("experiment", picture.text("experiment_state"), BY_NAME["experiment_state"].text),
