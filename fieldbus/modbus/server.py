@@ -263,7 +263,13 @@ class _Listener(ThreadingTCPServer):
             super().finish_request(request, client_address)
             return
         peer = self._connections.pop(request)
-        with self._guard.wrap(request) as secured:
+        try:
+            wrapped = self._guard.wrap(request)
+        except OSError as error:  # it was reset before its thread had begun
+            self._places.leave(peer)
+            self._say_refused(peer, failure_reason(error))
+            return
+        with wrapped as secured:
             self._connections[secured] = peer  # from here on the other is an empty shell
             try:
                 self.identities[peer] = self._guard.handshake(secured)
