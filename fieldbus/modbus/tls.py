@@ -138,8 +138,13 @@ class Guard:
         self._context, self._revoked = _server_context(tls), _revoked_numbers(tls)
 
     def wrap(self, connection: socket.socket) -> ssl.SSLSocket:
-        """Return an accepted connection as a TLS socket, before its `handshake`."""
+        """Return an accepted connection as a TLS socket, before its `handshake`.
+
+        Raises:
+            OSError: it is gone already; it is left as it was.
+        """
         self._look_for_changes()
+        connection.getpeername()  # of one that was reset the module ssl would leave a socket open
         return self._context.wrap_socket(connection, server_side=True, do_handshake_on_connect=False)
 
     def handshake(self, connection: ssl.SSLSocket) -> Identity:

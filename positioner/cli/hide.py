@@ -89,5 +89,5 @@ def _print_answer(sha256: str, answer: Mapping[str, Any]) -> None:
 
 
 def _listed(table: Mapping[str, Any]) -> str:
-    name, *rest = table.items()
-    return ", ".join([str(name[1]), *(f"{key} = {value:.4g}" for key, value in rest)])
+    rest = (f"{key} = {value:.4g}" for key, value in table.items() if key != "name")
+    return ", ".join([str(table["name"]), *rest])

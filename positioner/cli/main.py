@@ -5,6 +5,7 @@ Exit status: 0 done, 1 the thing asked about does not hold, 2 bad input, or an o
 """
 
 import argparse
+import errno
 import gc
 import importlib
 import io
@@ -49,6 +50,8 @@ COMMANDS = (
     "completion",
 )
 
+NO_MORE_FILES = frozenset((errno.EMFILE, errno.ENFILE))
+
 MODULES = {"import": "import_recording", "valve": "valve_from_data_sheet"}
 """Files of commands whose name is taken: by the language, by another file."""
 
@@ -66,6 +69,11 @@ def main(words: Sequence[str] | None = None) -> int:
     except KeyboardInterrupt:
         gc.freeze()  # else the interpreter looks through all that is left before it ends: half a second
         return 130
+    except OSError as error:
+        if error.errno not in NO_MORE_FILES:
+            raise
+        sys.stderr.write("positioner: this process may not have so many open files: `ulimit -n` says how many\n")
+        return 2
 
 
 def _done(words: Sequence[str] | None) -> int:

@@ -1,6 +1,7 @@
 """The commands as a person meets them: help, bad input as one line, exit status."""
 
 import csv
+import errno
 import io
 import json
 import os
@@ -379,3 +380,15 @@ def test_every_command_that_listens_says_where_in_the_same_words(command: str) -
 def test_a_command_needs_its_file_once(words: list[str], given: int, capsys: Capture) -> None:
     assert main(words) == 2
     assert f"CONFIG.toml: is required, once; {given} were given" in capsys.readouterr().err
+
+
+def test_a_process_that_may_open_no_more_files_says_so_in_a_line(
+    monkeypatch: pytest.MonkeyPatch, capsys: Capture
+) -> None:
+    def none_left(_: object) -> int:
+        raise OSError(errno.EMFILE, "Too many open files", "somewhere.py")
+
+    monkeypatch.setattr("positioner.cli.map.run", none_left)
+    assert main(["map"]) == 2
+    (line,) = capsys.readouterr().err.splitlines()
+    assert line.endswith("may not have so many open files: `ulimit -n` says how many")

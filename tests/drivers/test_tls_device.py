@@ -1,10 +1,12 @@
 """Modbus/TCP Security between driver and device: the contract of every driver, and every way not to get in."""
 
+import errno
 import logging
 import re
 import shutil
 import socket
 import ssl
+import struct
 import time
 import warnings
 from collections.abc import Iterator
@@ -33,6 +35,7 @@ from sim.slave.modbus_slave import device_of
 from sim.slave.simulated_device import Device
 from tests.certificates import folder, revoke, tls
 from tests.drivers import test_driver_contract as contract
+from tests.recovery import opened
 
 pytestmark = pytest.mark.real_time
 
@@ -493,3 +496,43 @@ def test_a_count_that_no_request_may_have_is_not_walked_through() -> None:
     guard.authorize(Identity("x", Role.OBSERVER), bytes.fromhex("10 0000 ffff 02 0001"))
     guard.authorize(Identity("x", Role.OBSERVER), bytes.fromhex("17 0000 0001 0000 ffff 02 0001"))
     assert len(asked) <= 2 * 123
+
+
+def test_connections_that_are_reset_at_once_are_refused_in_a_line_and_lock_out_nobody(
+    caplog: pytest.LogCaptureFixture,
+) -> None:
+    """400 of them were 64 tracebacks: the socket was gone before its thread had begun to secure it."""
+    limits = ServerLimits(most_clients=8, clients_per_host=8)
+    with device_with(guarded(), limits) as (_, server):
+        for _ in range(60):
+            line = socket.create_connection(("127.0.0.1", server.port), 5.0)
+            line.setsockopt(socket.SOL_SOCKET, socket.SO_LINGER, struct.pack("ii", 1, 0))  # the close is a reset
+            line.close()
+        driver = ModbusTcpDriver(ModbusTcpDevice(port=server.port, reply_timeout_s=5.0, tls=tls("daemon")))
+        opened(driver)
+        driver.close()
+    assert [each.getMessage() for each in caplog.records if each.exc_info] == []
+
+
+def test_a_connection_that_is_gone_before_it_is_secured_leaves_no_place_taken(
+    monkeypatch: pytest.MonkeyPatch, caplog: pytest.LogCaptureFixture
+) -> None:
+    guard, wrap = guarded(), Guard.wrap
+    gone = [True] * 20
+
+    def wrapped(each: Guard, line: socket.socket) -> ssl.SSLSocket:
+        if gone:
+            gone.pop()
+            raise OSError(errno.ENOTCONN, "Transport endpoint is not connected")
+        return wrap(each, line)
+
+    monkeypatch.setattr(Guard, "wrap", wrapped)
+    with device_with(guard, ServerLimits(most_clients=4, clients_per_host=4)) as (_, server):
+        while gone:
+            with socket.create_connection(("127.0.0.1", server.port), 5.0) as line:
+                assert line.recv(1) == b""
+        driver = ModbusTcpDriver(ModbusTcpDevice(port=server.port, reply_timeout_s=5.0, tls=tls("daemon")))
+        opened(driver)
+        driver.close()
+    assert [each.getMessage() for each in caplog.records if each.exc_info] == []
+    assert "Transport endpoint is not connected" in caplog.text

@@ -3,6 +3,7 @@
 import base64
 import hashlib
 import json
+import shutil
 from collections import Counter
 from collections.abc import Callable
 from pathlib import Path
@@ -161,6 +162,17 @@ def test_a_crafted_answer_is_one_line(kind: str, folder: Path, tmp_path: Path, c
     write_sealed(tmp_path, json.dumps(answer).encode())
     assert main(["hide", "--reveal", str(tmp_path)]) == 2
     assert "holds no answer that hide has sealed" in one_line(capsys)
+
+
+def test_an_answer_whose_names_come_last_is_revealed(folder: Path, tmp_path: Path, capsys: Capture) -> None:
+    """A table begins with its name where hide has written it; anybody else may have sorted it."""
+    answer = json.loads(base64.b64decode(json.loads((folder / SEALED).read_text())["answer_base64"]))
+    for table in (*answer["effects"], answer["valve"]):
+        table["name"] = table.pop("name")
+    shutil.copytree(folder, tmp_path, dirs_exist_ok=True)
+    write_sealed(tmp_path, json.dumps(answer).encode())
+    assert main(["hide", "--reveal", str(tmp_path)]) == 0
+    assert f"valve: {answer['valve']['name']}, mass_kg = " in capsys.readouterr().out
 
 
 @pytest.mark.parametrize("text", [b"", b"[]", b"7", b"null", b"\xff", b"[" * 100_000, b'{"files": 1}'])
