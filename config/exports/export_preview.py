@@ -9,7 +9,7 @@ from config.exports.column_preview import ColumnPreview, columns_of, columns_of_
 from config.exports.control_loop import LoopColumn, LoopColumns, loops_of
 from config.exports.file_kind import raw_tables
 from config.exports.header_search import SHOWN, Header
-from config.exports.proposal import proposal, quoted
+from config.exports.proposal import is_clock, proposal, quoted
 from config.exports.raw_table import RawTable
 from config.results.block import Block, Table, as_text
 
@@ -73,7 +73,7 @@ def preview(path: Path, sheet: str | None = None) -> ExportPreview:
         if _reads(wider[0]):
             columns, (words, open_), besides = of_all, wider, []
     decimal, _ = shown_decimal(columns, header.table.separator)
-    loops = tuple(loops_of([_of_loop(each, decimal) for each in columns if each.numbers]))
+    loops = tuple(loops_of([_of_loop(each, decimal) for each in columns if each.numbers and not is_clock(each)]))
     if loops and not any(each.position for each in loops):
         words, open_ = (), tuple(_no_stem(each) for each in loops)
     return ExportPreview(_what(header, tables), _place(header), tuple(columns), words, (*open_, *besides), loops)

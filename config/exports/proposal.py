@@ -205,10 +205,19 @@ def _rank(ours: str, column: ColumnPreview) -> int | None:
         return None
     if ours == "time_s":
         return rank if any(begins_number(cell) and cell != "" for cell in column.cells) else None
-    if not column.numbers or not (column.unit is None or column.unit in allowed_units(ending_of(ours))):
+    if (
+        is_clock(column)
+        or not column.numbers
+        or not (column.unit is None or column.unit in allowed_units(ending_of(ours)))
+    ):
         return None
     # The set point of a position is none, unless there is no other.
     return rank if ours != "position_m" or not is_called(SETPOINT, column.name) else rank + len(COMMON[ours])
+
+
+def is_clock(column: ColumnPreview) -> bool:
+    """Return whether a column is called as a time and rises as one: it is none of the signals."""
+    return rank_by_name("time_s", column.name) == 0 and may_be_clock(column.cells)
 
 
 def _is_setpoint(column: ColumnPreview) -> bool:

@@ -69,6 +69,11 @@ WRITTEN: dict[str, tuple[str, Callable[[Path], None], tuple[str, str, str]]] = {
         lambda path: pairs(path, "FV1.OUT,,FV1.ZT,", "Timestamp,Value,Timestamp,Value"),
         ("time_s=Timestamp", "command_pa=FV1.OUT Value:bar", "position_m=FV1.ZT Value:mm"),
     ),
+    "counted pairs under the tags": (
+        "pairs.csv",
+        lambda path: pairs(path, "FV1.OUT,,FV1.ZT,", "Timestamp,Value,Timestamp,Value", counted=True),
+        ("time_s=Timestamp", "command_pa=FV1.OUT Value:bar", "position_m=FV1.ZT Value:mm"),
+    ),
     "pairs by their places": (
         "pairs.csv",
         lambda path: pairs(path, "Timestamp,Value,Timestamp,Value"),

@@ -146,3 +146,13 @@ def test_a_file_of_zeros_is_refused_by_its_beginning(tmp_path: Path) -> None:
         read_recording(path)
     with pytest.raises(InputError, match=r"begins with zeros alone: it is damaged, or no text$"):
         raw_tables(path)
+
+
+@pytest.mark.parametrize("time_s", ["1e308", "-1e308", "3e12"])
+def test_a_time_that_is_none_is_one_line(time_s: str, tmp_path: Path) -> None:
+    """It broke least squares down, and their steps were infinite."""
+    rows = [f"{0.1 * i},5e4,0.01" for i in range(60)]
+    rows[0 if time_s.startswith("-") else -1] = f"{time_s},5e4,0.01"
+    (tmp_path / "r.csv").write_text("\n".join(["time_s,command_pa,position_m", *rows]))
+    with pytest.raises(InputError, match=r"time_s: sample (1|60) is at .* s; allowed are 1e\+12 s either way"):
+        Recording.read(tmp_path / "r.csv")

@@ -19,15 +19,16 @@ MOTIONS = {
 }
 
 
-def recording(position_m: Column) -> Recording:
-    noise_m = 5e-6 * np.random.default_rng(3).standard_normal(T.size)
-    return Recording({"time_s": T, "command_pa": 2e4 + 2e6 * position_m, "position_m": position_m + noise_m})
+def recording(position_m: Column, noise_m: float = 5e-6) -> Recording:
+    noise = noise_m * np.random.default_rng(3).standard_normal(T.size)
+    return Recording({"time_s": T, "command_pa": 2e4 + 2e6 * position_m, "position_m": position_m + noise})
 
 
+@pytest.mark.parametrize("noise_m", [5e-6, 0.0])
 @pytest.mark.parametrize("kind", MOTIONS)
-def test_it_is_said_to_move_both_ways_where_it_does(kind: str) -> None:
+def test_it_is_said_to_move_both_ways_where_it_does(kind: str, noise_m: float) -> None:
     position_m, ways = MOTIONS[kind]
-    said = "; ".join(compare(recording(position_m), VALVE).sentences)
+    said = "; ".join(compare(recording(position_m, noise_m), VALVE).sentences)
     assert "does not move" not in said
     assert ("only opens" in said, "only closes" in said) == (ways == (1,), ways == (-1,))
 
