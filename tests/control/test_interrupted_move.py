@@ -264,3 +264,21 @@ def test_an_identification_begun_meanwhile_and_broken_off_comes_back() -> None:
     loop.ask(eta=QUIET)
     loop.run(4.0)
     assert abs(loop.position - SMALL) < 1e-3
+
+
+@pytest.mark.parametrize("dark_s", [8.0, 120.0])
+def test_an_outage_while_the_stem_moves_is_not_learnt_as_its_slowness(dark_s: float) -> None:
+    """After 8 s the next moves took 29, 22, 18 and 14 s, after 120 s one had not begun after four minutes."""
+    loop = loop_of().away()
+    before = loop.cycle._controller._statics.detector.answers
+    loop.driver.spoil = absurd
+    loop.run(dark_s)
+    loop.driver.spoil = lambda reading: reading
+    loop.ask(acknowledgements=1)
+    loop.choose(Mode.AUTOMATIC)
+    for at in (0.65, 0.6, 0.604):
+        loop.step_to(at)
+        loop.run(4.0)
+        assert abs(loop.position - at) < THERE
+    answers = loop.cycle._controller._statics.detector.answers
+    assert answers.longest_s < 2.0 * before.longest_s + PERIOD_S

@@ -6,6 +6,7 @@ from collections.abc import Callable
 import pytest
 
 from positioner.estimation.landings.landing_detector import LandingDetector, SlideOutcome
+from positioner.estimation.landings.seen_time import SeenTime
 
 STROKE_M = 0.1
 PERIOD_S = 0.02
@@ -113,3 +114,31 @@ def test_a_stem_rests_for_nobody_before_the_pressure_has_arrived() -> None:
     (held,) = (each for each in outcomes if each is not None)
     assert not held.moved
     assert held.time_s - begins_s - waits_s >= 1.0, "a stem that has never answered may yet"
+
+
+@pytest.mark.parametrize("dark_s", [0.0, 8.0, 600.0])
+@pytest.mark.parametrize("gone_at", [1, 5, 20])
+def test_an_answer_is_as_long_as_it_was_seen_to_be(dark_s: float, gone_at: int) -> None:
+    """A stem behind a lag of 0.1 s; so many samples after the command nobody sees it for a while."""
+    detector, period_s = LandingDetector(0.1), 0.02
+    now_s, position_m = 0.0, 0.03
+    for _ in range(100):
+        now_s += period_s
+        detector.update(now_s, position_m, 50e3, math.nan)
+    moved_s = 0.0
+    for sample in range(400):
+        step_s = period_s + (dark_s if sample == gone_at else 0.0)
+        now_s, moved_s = now_s + step_s, moved_s + step_s
+        detector.update(now_s, position_m + 0.01 * (1.0 - math.exp(-moved_s / 0.1)), 60e3, math.nan)
+    assert 0.0 < detector.answers.longest_s < 1.5
+    assert detector.rest is not None
+
+
+def test_a_loop_that_becomes_slower_is_seen_again() -> None:
+    clock, now_s = SeenTime(), 0.0
+    for period_s in (0.01, 0.1):
+        for _ in range(60):
+            now_s += period_s
+            shown_s = clock.at(now_s)
+    later_s = clock.at(now_s + 0.1)
+    assert later_s - shown_s == pytest.approx(0.1)

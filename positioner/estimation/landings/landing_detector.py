@@ -11,7 +11,8 @@ of the moving stem holds where it rests. No landing is
 How long a stem takes to answer is learnt: a stem that has not moved may yet, so it is waited for as long as the longest
 answer seen, for the size of the step (a rate limit), or, where the pressure is measured, from its arrival on
 (`pressure_arrival`). One that answers later still corrects what was learnt, but one that moves when ten times the
-longest answer has gone by has been set free by something else: that says nothing of how long it takes.
+longest answer has gone by has been set free by something else: that says nothing of how long it takes. An answer is as
+long as it was seen to be: an outage is no slowness of the stem.
 """
 
 from collections.abc import Callable
@@ -20,6 +21,7 @@ from typing import NamedTuple
 
 from config.codes import InhibitReason
 from positioner.estimation.landings.pressure_arrival import PressureArrival
+from positioner.estimation.landings.seen_time import SeenTime
 from positioner.estimation.landings.stem_at_rest import Rest, RestWindow
 
 VISIBLE = 5e-3
@@ -127,6 +129,9 @@ class LandingDetector:
         self._free_m = (low_m + STOP * stroke_m, high_m - STOP * stroke_m)
         self._window = RestWindow(stroke_m)
         self._arrival = PressureArrival()
+        self._seen = SeenTime()
+        self._clock_s = 0.0
+        """Of the last sample; all other times are those for which the stem was seen (`seen_time`)."""
         self._level_pa = nan
         self._sense = 0
         self._running_on = False
@@ -187,6 +192,7 @@ class LandingDetector:
 
         A change counts from when its pressure has arrived, where somebody knows that.
         """
+        self._clock_s, time_s = time_s, self._seen.at(time_s)
         if not 0.0 < self.quantum_m < self._finer_m:
             self._learn_quantum(position_m)
         if command_pa != self._level_pa:
@@ -209,7 +215,7 @@ class LandingDetector:
             return None
         self.rest, self._away = rest, 0
         self._window.learn_noise(rest)
-        outcome = None if self._known else self._outcome(time_s, rest)
+        outcome = None if self._known else self._outcome(rest)
         self._answered = self._answered or (outcome is not None and outcome.moved)
         self._known = self._known or self._answered
         return outcome
@@ -296,7 +302,7 @@ class LandingDetector:
             slowness_s_per_pa = self.answers.slowness_s_per_pa
         self.answers = Answers(max(answer_s, longest_s), slowness_s_per_pa, large_pa)
 
-    def _outcome(self, time_s: float, rest: Rest) -> SlideOutcome:
+    def _outcome(self, rest: Rest) -> SlideOutcome:
         slid_m = self._sense * (rest.position_m - self._from_m) - rest.crept_m / CREPT_SINCE
         moved = slid_m > self._visible_m(rest)
         creep_s = max(0.0, rest.came_to_rest_s - INSTANTS * self._interval_s)
@@ -304,7 +310,7 @@ class LandingDetector:
             self._learn_answer(rest.came_to_rest_s)
             self._arrival.learn(rest.came_to_rest_s)
         return SlideOutcome(
-            time_s=time_s,
+            time_s=self._clock_s,
             direction=self._sense,
             from_m=self._from_m,
             command_pa=self._level_pa,
