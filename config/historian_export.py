@@ -137,7 +137,8 @@ def _group(
         metadata["recorded"] = clock.recorded
     name = "" if theirs is None else part.header.names[part.header.at[theirs.theirs][0]]
     origin_s = None if clock.origin_s is None else clock.origin_s + time_s[0] - clock.time_s[0]
-    return Group(time_s - zero_s, origin_s, {key: column[rows] for key, column in columns.items()}, name)
+    ordered = {key: column[rows] for key, column in columns.items()}
+    return Group(time_s - zero_s, origin_s, ordered, name, id(part.header.table))
 
 
 def _good(path: Path, part: Samples, options: ExportOptions, metadata: dict[str, str]) -> "np.typing.NDArray[np.bool_]":

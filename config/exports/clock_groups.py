@@ -22,6 +22,8 @@ from config.exports.number_notation import is_numeral
 from config.exports.raw_table import Cell, RawTable
 from config.exports.turned_tables import table_of_signal, turned
 
+DISTINCT = 0.4
+"""Part of a clock's times that differ: two rows of a second are so many."""
 LOOKED_AT = 200
 """Rows by which a column is told to be a clock."""
 
@@ -91,9 +93,19 @@ def clock_places(header: Header) -> list[int]:
     """Return which columns of a table are clocks, by their names and by what is in them."""
     rows, several = _first_rows(header), Counter(header.as_written)
     written = header.as_written or header.names
-    called = [rank_by_name("time_s", name) is not None or (name and several[name] > 1) for name in written]
-    named = [index for index, is_clock in enumerate(called) if is_clock]
-    return [index for index in named if may_be_clock(_cells(rows, index))]
+    again = [bool(name) and several[name] > 1 for name in written]
+    return [
+        index
+        for index, name in enumerate(written)
+        if again[index] or rank_by_name("time_s", name) is not None
+        if may_be_clock(cells := _cells(rows, index)) and (again[index] or _mostly_distinct(cells))
+    ]
+
+
+def _mostly_distinct(cells: Sequence[Cell]) -> bool:
+    """Return whether hardly a time stands twice: what counts hours or runs is no clock of the rows."""
+    held = [cell for cell in cells if cell != ""]
+    return len(set(held)) > DISTINCT * len(held)
 
 
 def value_places(header: Header) -> list[int]:

@@ -6,21 +6,32 @@
 A command that changes seldom keeps the instants of its changes: each is a row of its own, at which the stem was not
 measured.
 
+Two clocks of one table whose rows step alike tell the same instants where they are of other kinds, units or zones: a
+stamp and what has elapsed, s and ms, local time and UTC. Their rows are pairs.
+
 What is asked of the stem before the first sample of it, and for long after its last, nobody knows: the stem's samples
 there are left out, and counted.
 """
 
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from pathlib import Path
 
 import numpy as np
 
 from config.errors import InputError
+from config.exports.export_units import UNITS
 from config.recording import Column
 
 MEASURED = ("position", "velocity", "pressure", "load", "current", "force", "torque")
 """How the names of columns begin that are measured."""
+FEWEST = 3
+ALIKE = 1e-2
+"""Of a step: how alike those of two clocks of the same rows are, each rounded by its program."""
+RATIOS = tuple(each for unit in UNITS["_s"].values() if unit != 1.0 for each in (unit, 1.0 / unit))
+"""Of two clocks that count in different units."""
+ZONE_S = 900.0
+"""Zones of time lie apart by quarters of an hour."""
 SELDOM = 0.5
 """Changes of a command a sample of the stem, up to which each keeps its instant."""
 SAME = 1e-3
@@ -36,12 +47,14 @@ class Group:
         origin_s: zero of this clock, s since 1970; None where it does not tell the day.
         columns: by our names.
         named: what its clock is called, for people.
+        table: which table of the file it is from.
     """
 
     time_s: Column
     origin_s: float | None
     columns: dict[str, Column]
     named: str
+    table: int = 0
 
 
 def joined(path: Path, groups: Sequence[Group]) -> tuple[Column, dict[str, Column], dict[str, str]]:
@@ -51,8 +64,8 @@ def joined(path: Path, groups: Sequence[Group]) -> tuple[Column, dict[str, Colum
         InputError: no time is common to all, or one clock tells the day and another does not.
     """
     base = next(each for each in groups if any(name.startswith(("position", "velocity")) for name in each.columns))
-    others = [each for each in groups if each is not base]
-    if len({each.origin_s is None for each in groups}) > 1:
+    others = [_paired(each, base) for each in groups if each is not base]
+    if len({each.origin_s is None for each in (base, *others)}) > 1:
         told = next(each.named for each in groups if each.origin_s is not None)
         not_told = next(each.named for each in groups if each.origin_s is None)
         raise InputError(
@@ -88,6 +101,24 @@ def joined(path: Path, groups: Sequence[Group]) -> tuple[Column, dict[str, Colum
     if added := int((~measured & within).sum()):
         notes["rows at which a command changes between samples of the stem"] = str(added)
     return time_s[within], {name: column[within] for name, column in columns.items()}, notes
+
+
+def _paired(group: Group, base: Group) -> Group:
+    """Return a group by the stem's clock where its own tells the same instants in other words."""
+    own_s, stem_s = group.time_s, base.time_s
+    if group.table != base.table or own_s.size != stem_s.size or own_s.size < FEWEST:
+        return group
+    ratio = float(np.ptp(own_s) / np.ptp(stem_s)) if np.ptp(stem_s) > 0.0 else 0.0
+    if ratio <= 0.0 or not np.allclose(np.diff(own_s), ratio * np.diff(stem_s), rtol=0.0, atol=ALIKE * _step_s(own_s)):
+        return group
+    told_otherwise = any(abs(ratio / each - 1.0) < ALIKE for each in RATIOS)
+    if abs(ratio - 1.0) < ALIKE:
+        if group.origin_s is None or base.origin_s is None:
+            told_otherwise = (group.origin_s is None) != (base.origin_s is None)
+        else:
+            late_s = own_s[0] - stem_s[0] + group.origin_s - base.origin_s
+            told_otherwise = round(late_s / ZONE_S) != 0 and abs(late_s - ZONE_S * round(late_s / ZONE_S)) < 1.0
+    return replace(group, time_s=stem_s, origin_s=base.origin_s) if told_otherwise else group
 
 
 def _is_held(name: str) -> bool:

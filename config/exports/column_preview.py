@@ -13,7 +13,7 @@ from pathlib import Path
 from config.errors import InputError
 from config.exports.cell_kinds import parted
 from config.exports.clock_groups import clock_places, value_places
-from config.exports.column_names import STATUS
+from config.exports.column_names import STATUS, rank_by_name
 from config.exports.header_search import Header, guess_header
 from config.exports.number_notation import decimal_sign, is_numeral
 from config.exports.raw_table import Cell, RawTable
@@ -108,8 +108,7 @@ def columns_of(header: Header) -> list[ColumnPreview]:
     signals = signals_in(header)
     if not signals:
         return _plain(header)
-    clocks = {header.names[index] for index in clock_places(header)}
-    found = [each for each in _plain(header) if each.name in clocks or STATUS.search(each.name)]
+    found = [each for each in _plain(header) if rank_by_name("time_s", each.name) == 0 or STATUS.search(each.name)]
     for signal in signals:
         table = table_of_signal(header.table, signal)
         of_it = guess_header([table]) if table else None

@@ -16,6 +16,7 @@ from itertools import islice, zip_longest
 from config.errors import InputError
 from config.exports.cell_kinds import begins_number
 from config.exports.column_names import COUNTER, STATUS, is_called, rank_by_name
+from config.exports.export_units import unit_named
 from config.exports.header_search import Header, guess_header
 from config.exports.number_notation import is_numeral
 from config.exports.raw_table import Cell, RawTable
@@ -27,6 +28,7 @@ ROW_A_SIGNAL = 10
 MOST_ROWS_OF_SIGNALS = 60
 MOST_SIGNALS = 20
 """Words of a column that says whose a value is, which a preview lists."""
+UNIT = r"^(unit|einheit|unit[ée]s?|unidad|unit[àa]|uom|eu|engineering units?|jednostka)s?$"
 VALUE = r"value|wert|valeur|valor|warto"
 
 
@@ -93,9 +95,22 @@ def table_of_signal(table: RawTable, signal: str) -> RawTable | None:
     values = _values(header, [cells for _, cells in rows[:LOOKED_AT]])
     if len(values) != 1:
         return None
+    unit = next((index for index, name in enumerate(header.names) if is_called(UNIT, name)), None)
+    if unit is not None:
+        rows = [(line, _with_its_unit(cells, values[0], unit)) for line, cells in rows]
     names = [signal if index == values[0] else name for index, name in enumerate(header.names)]
     first: list[tuple[int, list[Cell]]] = [(header.line, list(names))]
     return replace(table, what=f"{table.what}, rows of {signal!r}", rows=lambda: iter(first + rows), length=len(rows))
+
+
+def _with_its_unit(cells: Sequence[Cell], place: int, unit: int) -> list[Cell]:
+    """Return a row with the unit that stands in a column of its own behind the value."""
+    found = list(cells)
+    said = str(cells[unit]) if unit < len(cells) else ""
+    if unit_named(said) and place < len(cells) and cells[place] != "":
+        value = cells[place]
+        found[place] = f"{value!r} {said}" if isinstance(value, float) else f"{value} {said}"
+    return found
 
 
 def _rows_of(header: Header, signal: str) -> Iterator[tuple[int, list[Cell]]]:

@@ -133,6 +133,55 @@ def test_a_second_clock_beside_the_rows_is_no_other_time(tmp_path: Path) -> None
     assert "clocks" not in read.metadata
 
 
+@pytest.mark.parametrize(
+    ("second", "name"),
+    [
+        ([f"{t:.1f}" for t in STEM_S], "Elapsed time"),
+        ([f"{1e3 * t + 77e6:.0f}" for t in STEM_S], "Uptime [ms]"),
+        ([f"{1e3 * t:.0f}" for t in STEM_S], "Uptime"),
+        (stamps(STEM_S + 3600.0), "Local time"),
+        (stamps(STEM_S - 19_800.0), "Local time"),
+    ],
+)
+def test_a_clock_between_the_columns_that_tells_the_same_instants_leaves_the_rows_as_they_are(
+    second: list[str], name: str, tmp_path: Path
+) -> None:
+    first = [f"{t:.1f}" for t in STEM_S] if name == "Uptime" else stamps(STEM_S)
+    rows = zip(first, STEM_MM / 50, second, STEM_MM, strict=True)
+    (tmp_path / "a.csv").write_text("\n".join([f"Time,OUT,{name},ZT", *(",".join(map(str, row)) for row in rows)]))
+    read = read_export(
+        tmp_path / "a.csv", read_mapping(("time_s=Time", "position_m=ZT:mm", "command_pa=OUT:bar")), None
+    )
+    assert len(read) == len(STEM_S)
+    np.testing.assert_allclose(read.command_pa, 2e3 * STEM_MM)
+    np.testing.assert_allclose(read.position_m, 1e-3 * STEM_MM)
+
+
+def test_what_counts_runs_between_the_columns_is_no_clock(tmp_path: Path) -> None:
+    rows = zip(STEM_S, STEM_MM / 50, np.arange(len(STEM_S)) // 20, STEM_MM, strict=True)
+    (tmp_path / "a.csv").write_text("\n".join(["Time,OUT,Run time,ZT", *(",".join(map(str, row)) for row in rows)]))
+    read = read_export(
+        tmp_path / "a.csv", read_mapping(("time_s=Time", "position_m=ZT:mm", "command_pa=OUT:bar")), None
+    )
+    np.testing.assert_allclose(read.time_s, STEM_S)
+    np.testing.assert_allclose(read.command_pa, 2e3 * STEM_MM)
+
+
+def test_a_unit_in_a_column_of_its_own_goes_with_its_value(tmp_path: Path) -> None:
+    values = [
+        (t, *each)
+        for t, u, x in zip(stamps(STEM_S), STEM_MM / 50, STEM_MM, strict=True)
+        for each in (("FV1.OUT", u, "bar"), ("FV1.ZT", x, "mm"))
+    ]
+    lines = ["Tag;Time;Value;Unit", *(f"{tag};{t};{value};{unit}" for t, tag, value, unit in values)]
+    (tmp_path / "a.csv").write_text("\n".join(lines))
+    assert "position_m=FV1.ZT:mm" in preview(tmp_path / "a.csv").words
+    sources = read_mapping(("time_s=Time", "position_m=FV1.ZT", "command_pa=FV1.OUT"))
+    read = read_export(tmp_path / "a.csv", sources, None)
+    np.testing.assert_allclose(read.position_m, 1e-3 * STEM_MM)
+    np.testing.assert_allclose(read.command_pa, 2e3 * STEM_MM)
+
+
 def test_what_is_asked_is_not_made_up_where_nobody_has_recorded_it(tmp_path: Path) -> None:
     """The stem's rows go on four times as long as the command's."""
     rows = zip(STEM_S, STEM_MM / 50, 4.0 * STEM_S, STEM_MM, strict=True)
@@ -143,7 +192,7 @@ def test_what_is_asked_is_not_made_up_where_nobody_has_recorded_it(tmp_path: Pat
 
 
 def test_clocks_that_cannot_be_laid_side_by_side_are_refused(tmp_path: Path) -> None:
-    rows = zip(stamps(STEM_S), STEM_MM / 50, STEM_S, STEM_MM, strict=True)
+    rows = zip(stamps(STEM_S), STEM_MM / 50, np.sort(STEM_S + 0.2 * np.sin(STEM_S)), STEM_MM, strict=True)
     (tmp_path / "a.csv").write_text("\n".join(["Time,u,Time,x", *(",".join(map(str, row)) for row in rows)]))
     with pytest.raises(InputError, match=r"tells the day and .* does not"):
         read_export(tmp_path / "a.csv", read_mapping(["time_s=Time", "position_m=x:mm", "command_pa=u:bar"]), None)
@@ -191,6 +240,10 @@ def test_of_two_clocks_that_contradict_each_other_the_finer_is_not_proposed(tmp_
         proposed = preview(tmp_path / "a.csv").words
         assert ("time_s=Time_ms:ud" in proposed) == finer
         assert ("time_s=TimeString" in proposed) != finer
+        signals = zip(day(STEM_S), days, STEM_MM, STEM_MM / 50, strict=True)
+        values = [f"{tag};{a};{v};{b:.6f}" for a, b, c, d in signals for tag, v in (("Hub", c), ("Stelldruck", d))]
+        (tmp_path / "b.csv").write_text("\n".join(["VarName;TimeString;VarValue;Time_ms", *values]))
+        assert ("time_s=Time_ms:ud" in preview(tmp_path / "b.csv").words) == finer
 
 
 def day(times_s: np.ndarray) -> list[str]:
