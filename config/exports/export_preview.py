@@ -75,7 +75,7 @@ def preview(path: Path, sheet: str | None = None) -> ExportPreview:
     decimal, _ = shown_decimal(columns, header.table.separator)
     loops = tuple(loops_of([_of_loop(each, decimal) for each in columns if each.numbers and not is_clock(each)]))
     if loops and not any(each.position for each in loops):
-        words, open_ = (), tuple(_no_stem(each) for each in loops)
+        words, open_ = (), tuple(_no_stem(path, each) for each in loops)
     return ExportPreview(_what(header, tables), _place(header), tuple(columns), words, (*open_, *besides), loops)
 
 
@@ -103,11 +103,12 @@ def _of_loop(column: ColumnPreview, decimal: str) -> LoopColumn:
     return LoopColumn(column.name, unit, numbers_of(column.cells, decimal))
 
 
-def _no_stem(loop: LoopColumns) -> str:
+def _no_stem(path: Path, loop: LoopColumns) -> str:
     """Return what to say of a loop whose stem is not measured."""
     return (
-        f"{loop.because}: {loop.process_value!r} is what a loop controls and no stem's position, and nothing is "
-        "compared with it; export the stem's own position (ZT, travel, feedback) beside the command"
+        f"{loop.because}: this is a loop, not a stem, and {loop.process_value!r} is compared with nothing; "
+        f"`positioner loop {path}` says from it whether the valve sticks; a model needs the stem's own position (ZT, "
+        "travel, feedback) beside the command"
     )
 
 

@@ -14,6 +14,7 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
     """Declare the command line."""
     parser.add_argument("recording", type=Path, nargs="+", metavar="REC", help="a historian's export: time, OP, PV, SP")
     parser.add_argument("--json", type=Path, metavar="FILE", help="write what was found as JSON, a list")
+    parser.add_argument("--report", type=Path, metavar="FILE.html", help="write it as a page")
     add_loop_arguments(parser)
 
 
@@ -21,8 +22,13 @@ def run(arguments: argparse.Namespace) -> int:
     """Print the verdict of each loop; 0 if every valve is without fault, else 1."""
     from positioner.cli.parts.progress import at_work
     from workbench.loops import diagnose_loop
+    from workbench.loops.loop_report import report_loop
+    from workbench.report import require_plotly
 
     writable(arguments.json, "--json")
+    writable(arguments.report, "--report")
+    if arguments.report is not None:
+        require_plotly(arguments.report)
     found = []
     for path in arguments.recording:
         record = read_record(path, arguments)
@@ -31,4 +37,6 @@ def run(arguments: argparse.Namespace) -> int:
         print(found[-1].summary())
     if arguments.json is not None:
         write_json(arguments.json, [each.as_json() for each in found])
+    if arguments.report is not None:
+        report_loop(found, arguments.report)
     return 0 if all(each.verdict == "something else" for each in found) else 1

@@ -42,6 +42,7 @@ COMMANDS = (
     "extend",
     "fleet",
     "loop",
+    "loops",
     "workbench",
     "page",
     "reproduce",

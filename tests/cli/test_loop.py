@@ -48,3 +48,28 @@ def test_counts_are_read_by_the_range_that_a_person_says(tmp_path: Path) -> None
     main(["loop", str(export), *words])
     (found,) = json.loads((tmp_path / "a.json").read_text())
     assert found["stiction_pct"] == pytest.approx(LOOP.truth.stiction_pct, rel=0.2)
+
+
+@pytest.mark.parametrize("command", [["compare", "--valve", "seed"], ["diagnose", "--valve", "seed"], ["response"]])
+def test_a_command_that_wants_a_stem_names_the_one_that_reads_a_loop(
+    tmp_path: Path, capsys: pytest.CaptureFixture[str], command: list[str]
+) -> None:
+    columns = (LOOP.time_s, LOOP.sp, LOOP.pv, LOOP.op_pct)
+    export = written(tmp_path / "a.csv", "Time;FIC101.SP;FIC101.PV;FIC101.OP", *columns, delimiter=";")
+    assert main([command[0], str(export), *command[1:]]) == 2
+    assert "this is a loop, not a stem" in (error := capsys.readouterr().err)
+    assert f"`positioner loop {export}`" in error
+
+
+def test_a_plant_is_ranked_and_what_cannot_be_read_is_said(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    written(tmp_path / "a.csv", "t,a,b", LOOP.time_s, LOOP.op_pct, LOOP.pv)
+    other = draw_loop(7, "external noise")
+    written(tmp_path / "b.csv", "t,a,b", other.time_s, other.op_pct, other.pv)
+    manifest = tmp_path / "plant.csv"
+    manifest.write_text("loop,file,time,op,pv\nB,b.csv,t,a,b\nA,a.csv,t,a,b\nC,none.csv,t,a,b\n")
+    page = tmp_path / "p.html"
+    assert main(["loops", str(manifest), "--workers", "1", "--report", str(page)]) == 1
+    out, err = capsys.readouterr()
+    assert out.index("  A ") < out.index("  B ")
+    assert "C: " in err
+    assert page.stat().st_size > 1e6

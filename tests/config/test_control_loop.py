@@ -70,4 +70,4 @@ def test_nothing_is_proposed_of_a_loop_without_a_stem(tmp_path: Path) -> None:
     found = preview(tmp_path / "loop.csv")
     assert found.words == ()
     assert [each.process_value for each in found.loops] == ["PV"]
-    assert "no stem's position" in found.summary()
+    assert "this is a loop, not a stem" in found.summary()

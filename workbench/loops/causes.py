@@ -47,6 +47,7 @@ class Friction:
     Attributes:
         stiction_pct, low_pct, high_pct: apparent stiction S and its 95 % interval, % of the output.
         slip_jump_pct: J, likewise.
+        slides_on: whether the stem follows after a slip until the output turns.
         share: of the output's span that S is.
         response: of the process, lag and delay in rows; its gain in standard deviations of PV a one of OP.
     """
@@ -55,6 +56,7 @@ class Friction:
     low_pct: float
     high_pct: float
     slip_jump_pct: float
+    slides_on: bool
     share: float
     response: Response
 
@@ -153,6 +155,40 @@ def hold_causes(record: LoopRecord, oscillation: Oscillation, action: int) -> Ca
     )
 
 
+@dataclass(frozen=True, slots=True)
+class FittedPath:
+    """Stem and PV as friction has them, beside the record, in rows of the comparison, (n,) each."""
+
+    time_s: Array
+    output_pct: Array
+    stem_pct: Array
+    pv: Array
+    pv_fitted: Array
+
+
+def fitted_path(record: LoopRecord, oscillation: Oscillation, friction: Friction) -> FittedPath:
+    """Return what friction makes of a record's output."""
+    rows = rows_of(record, oscillation)
+    pct, every = rows.output_pct, rows.scale.coarse
+    stem = rest_positions(
+        rows.output,
+        np.array([friction.stiction_pct / pct]),
+        np.array([friction.slip_jump_pct / pct]),
+        np.array([friction.slides_on]),
+    )[:, 0]
+    told = respond(stem, rows.scale, friction.response.lag, friction.response.delay)
+    weights = np.polyfit(told, rows.pv, 1)
+    time_s = np.asarray(rows.period_s * every * (np.arange(rows.pv.size) + 0.5), np.float64)
+    middle = float(record.op_pct.mean())
+    return FittedPath(
+        time_s,
+        middle + pct * averaged(rows.output, every),
+        middle + pct * averaged(stem, every),
+        record.pv.mean() + rows.pv_unit * rows.pv,
+        record.pv.mean() + rows.pv_unit * np.polyval(weights, told),
+    )
+
+
 def _paths(output: Array, scale: Scale, response: Response) -> Array:
     """Return the response to the output, (n, 3), and the same a tenth and a fifth of a cycle later.
 
@@ -187,15 +223,15 @@ def _friction(rows: Rows, action: int) -> Friction | None:
         of_manner = np.where(trials.slides_on == manner, trials.costs, np.inf)
         at = int(np.argmin(of_manner))
         if np.isfinite(of_manner[at]):
-            best.append(_refined(rows, trials, at, span, action, tried))
+            best.append((manner, *_refined(rows, trials, at, span, action, tried)))
     if not best:
         return None
-    size, ratio, response = min(best, key=lambda each: each[2].cost)
+    manner, size, ratio, response = min(best, key=lambda each: each[3].cost)
     low, high = _interval(
         np.concatenate([each.stiction for each in tried]), np.concatenate([each.costs for each in tried]), size
     )
     pct = rows.output_pct
-    return Friction(size * pct, low * pct, high * pct, size * ratio * pct, min(1.0, size / span), response)
+    return Friction(size * pct, low * pct, high * pct, size * ratio * pct, manner, min(1.0, size / span), response)
 
 
 def _refined(

@@ -10,11 +10,12 @@ from config.extras import needed
 from config.results.block import Block, Table
 from config.results.result import Result
 from workbench.loops.calibration import CALIBRATION
-from workbench.loops.causes import Causes, hold_causes
+from workbench.loops.causes import Causes, fitted_path, hold_causes
 from workbench.loops.controller_law import ControllerLaw, see_law
 from workbench.loops.loop_record import LoopRecord
 from workbench.loops.oscillation import Oscillation, find_oscillation
 from workbench.loops.quality_gates import Gate, closed_gates
+from workbench.loops.remedies import Remedies, find_remedies
 from workbench.loops.shape_methods import Vote, votes
 from workbench.loops.thresholds import LIMITS
 
@@ -39,6 +40,7 @@ class LoopDiagnosis(Result):
         causes: as they were held against each other; None where the record is insufficient.
         votes: of the literature's methods.
         sensitivity: greatest |1/(1+L)| of the identified loop, and its period, s; None where the law is not seen.
+        remedies: what to do about a valve that sticks; None where it does not, or the law is not seen.
     """
 
     record: LoopRecord
@@ -52,6 +54,7 @@ class LoopDiagnosis(Result):
     causes: Causes | None
     votes: tuple[Vote, ...]
     sensitivity: tuple[float, float] | None
+    remedies: Remedies | None = None
 
     @property
     def variance_cost(self) -> float:
@@ -68,7 +71,7 @@ class LoopDiagnosis(Result):
             assert self.probability is not None
             each = self.causes.friction
             return (
-                f"{self.record.name}: the valve sticks ({100 * self.probability:.0f} %): apparent stiction "
+                f"{self.record.name}: the valve sticks ({min(99.0, 100 * self.probability):.0f} %): apparent stiction "
                 f"{each.stiction_pct:.2g} % of the output ({each.low_pct:.2g} to {each.high_pct:.2g}), "
                 f"slip jump {each.slip_jump_pct:.2g} %"
             )
@@ -91,6 +94,14 @@ class LoopDiagnosis(Result):
                     [(name, f"{cost - least:.1f}") for name, cost in sorted(self.causes.costs.items(), key=_second)],
                 )
             )
+        if self.remedies is not None:
+            rows = [
+                (r.name, f"{r.error_ratio:.2f}", f"{r.travel_ratio:.2f}", r.settings) for r in self.remedies.remedies
+            ]
+            trust = (
+                "" if self.remedies.credible else " (a guess: the identified loop does not swing as the record does)"
+            )
+            said.append(Table(("what to do" + trust, "error", "travel", ""), rows, "simulated, of now:"))
         said.append(
             Table(("method of the literature", "index", ""), [(v.method, f"{v.index:.2f}", v.says) for v in self.votes])
         )
@@ -141,6 +152,10 @@ class LoopDiagnosis(Result):
             "variance_cost": self.variance_cost,
             "controller": {"gain": self.law.gain, "reset_s": self.law.reset_s, "explained": self.law.explained},
             "insufficient": [{"code": g.code, "says": g.says, "instead": g.instead} for g in self.gates],
+            "remedies": [
+                {"name": r.name, "settings": r.settings, "error_ratio": r.error_ratio, "travel_ratio": r.travel_ratio}
+                for r in (self.remedies.remedies if self.remedies else ())
+            ],
             "votes": {vote.method: {"index": vote.index, "says": vote.says} for vote in self.votes},
             "sentence": self.sentence,
         }
@@ -182,9 +197,21 @@ def diagnose_loop(record: LoopRecord) -> LoopDiagnosis:
         verdict = "sticks"
     elif probability <= LIMITS.other_probability:
         verdict, cause = "something else", _other(oscillation, setpoint, causes, sensitivity)
+    treatable = verdict == "sticks" and law.seen and np.isfinite(law.reset_s)
+    remedies = _remedies(record, oscillation, law, causes) if treatable else None
     return LoopDiagnosis(
-        record, verdict, cause, probability, oscillation, setpoint, law, gates, causes, said, sensitivity
+        record, verdict, cause, probability, oscillation, setpoint, law, gates, causes, said, sensitivity, remedies
     )
+
+
+def _remedies(record: LoopRecord, oscillation: Oscillation, law: ControllerLaw, causes: Causes) -> Remedies | None:
+    if causes.friction is None:
+        return None
+    error = record.pv - (record.pv.mean() if record.sp is None else record.sp)
+    path = fitted_path(record, oscillation, causes.friction)
+    noise = float(np.diff(path.pv - path.pv_fitted).std() / np.sqrt(2.0))
+    process = (causes.lag_s, causes.delay_s, causes.gain)
+    return find_remedies(float(np.sqrt((error**2).mean())), law, causes.friction, process, noise, record.period_s)
 
 
 def _other(

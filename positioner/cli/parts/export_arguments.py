@@ -9,6 +9,7 @@ from typing import TYPE_CHECKING
 if TYPE_CHECKING:
     from collections.abc import Callable
 
+    from config.errors import InputError
     from config.exports.column_mapping import ExportOptions
     from config.recording import Recording
 
@@ -145,8 +146,33 @@ def read_any(path: Path, arguments: argparse.Namespace, stroke_m: float | None) 
         if getattr(arguments, name):
             raise InputError(f"--{name.replace('_', '-')}", "goes with --column; a recording is in SI units")
     with at_work(arguments.command, f"reading {path}{size}"):
-        recording = Recording.read(path)
+        try:
+            recording = Recording.read(path)
+        except InputError as error:
+            _refuse_loop(path, error)
+            raise
     return _stretch(recording, arguments)
+
+
+def _refuse_loop(path: Path, error: "InputError") -> None:
+    """Say of a file that lacks our columns that it is a control loop's, where it is.
+
+    Raises:
+        InputError: it is; names the command that reads it.
+    """
+    from config.errors import InputError
+    from config.exports.export_preview import preview
+
+    if "is missing" not in error.problem:
+        return
+    try:
+        loops = [each for each in preview(path).loops if each.position is None]
+    except InputError:
+        return
+    if loops:
+        raise InputError(
+            str(path), f"this is a loop, not a stem ({loops[0].because}): `positioner loop {path}` reads it"
+        ) from None
 
 
 def _stretch(recording: "Recording", arguments: argparse.Namespace) -> "Recording":

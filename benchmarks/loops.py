@@ -1,0 +1,222 @@
+"""Stiction from OP, PV and SP: how often it is told rightly. `python -m benchmarks.loops [--data FOLDER] [--drawn N]`.
+
+    drawn loops    with truth (`benchmarks.drawn_loops`), of seeds that did not calibrate
+    FOLDER         loops of others with labels, fetched by whoever runs it: labels.csv (file, loop, sticks, set) and
+                   files (time_s, op_pct or op, pv, sp); by loop: the median of its windows
+
+Every method gives a score a loop, higher where it says sticks. `--out FILE` writes them; `--scores FILE` judges those
+of another method in the same form: a CSV file of set, loop, sticks, method, score. `--calibrate` prints what
+`workbench.loops.calibration` and `LIMITS.least_interval` hold, from N loops of the seeds from 1000 on.
+"""
+
+import argparse
+import csv
+import time
+from collections import defaultdict
+from collections.abc import Iterator, Sequence
+from concurrent.futures import ProcessPoolExecutor
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any, cast
+
+import numpy as np
+from numba import njit
+
+from benchmarks.drawn_loops import CAUSES, DrawnLoop, Simulate, Truth, draw_loops, simulate
+from workbench.loops import LoopRecord, diagnose_loop
+from workbench.loops.calibration import calibrate
+from workbench.loops.oscillation import find_oscillation
+from workbench.loops.shape_methods import he
+from workbench.loops.thresholds import LIMITS
+
+OURS = "likelihood"
+METHODS = (OURS, "He", "Hagglund", "Horch", "Kano")
+CALIBRATION_SEEDS = 1000
+UNKNOWN = 0.3
+"""Score of a loop that is insufficient: the share of loops in plants whose valves stick."""
+
+
+@dataclass(frozen=True, slots=True)
+class Judged:
+    """A loop and what was said of it."""
+
+    truth: Truth
+    verdict: str
+    gated: str
+    cause: str
+    evidence: float
+    share: float
+    stiction_pct: float
+    low_pct: float
+    high_pct: float
+    scores: dict[str, float]
+    seconds: float
+
+
+@dataclass(frozen=True, slots=True)
+class Score:
+    """A line of the results file."""
+
+    set: str
+    loop: str
+    sticks: int
+    method: str
+    score: float
+
+
+def judge(loop: DrawnLoop) -> Judged:
+    begin_s = time.process_time()
+    found = diagnose_loop(LoopRecord.of_samples("drawn", loop.time_s, loop.op_pct, loop.pv, loop.sp))
+    friction = found.causes.friction if found.causes else None
+    scores = {vote.method: vote.index for vote in found.votes}
+    return Judged(
+        loop.truth,
+        found.verdict,
+        found.gates[0].code if found.gates else "",
+        found.cause,
+        found.causes.evidence if found.causes else 0.0,
+        found.causes.share if found.causes else 0.0,
+        friction.stiction_pct if friction else 0.0,
+        friction.low_pct if friction else 0.0,
+        friction.high_pct if friction else 0.0,
+        {OURS: UNKNOWN if found.probability is None else found.probability} | scores,
+        time.process_time() - begin_s,
+    )
+
+
+def judged(count: int, first_seed: int) -> list[Judged]:
+    loops = list(draw_loops(count, cast(Simulate, njit(simulate)), first_seed=first_seed))
+    with ProcessPoolExecutor() as pool:
+        return list(pool.map(judge, loops, chunksize=4))
+
+
+def area(scores: Sequence[float], sticks: Sequence[int]) -> float:
+    """Return the area under the ROC curve: how often a sticking loop has more than another, half for a tie."""
+    ours, others = ([s for s, each in zip(scores, sticks, strict=True) if each == which] for which in (1, 0))
+    return float(np.mean([(a > b) + 0.5 * (a == b) for a in ours for b in others])) if ours and others else np.nan
+
+
+def of_drawn(found: Sequence[Judged]) -> Iterator[str]:
+    called = [each for each in found if each.verdict == "sticks"]
+    right = [each for each in called if each.truth.cause == "sticks"]
+    of = sum(each.truth.cause == "sticks" for each in found)
+    yield f"drawn loops: {len(found)}, {of} stick; {np.mean([each.seconds for each in found]):.2f} s of a core each"
+    yield f"  called sticking: {len(called)}, wrong {share(len(called) - len(right), len(called))}"
+    ratios = np.array([each.stiction_pct / each.truth.stiction_pct for each in right])
+    inside = sum(each.low_pct <= each.truth.stiction_pct <= each.high_pct for each in right)
+    yield (
+        f"  of those rightly called: within 20 % {share(int((np.abs(ratios - 1.0) <= 0.2).sum()), ratios.size)}, "
+        f"in the interval {share(inside, ratios.size)}"
+    )
+    yield f"  {'truth':20}{'loops':>6}{'sticks':>8}{'else':>6}{'open':>6}{'insufficient':>14}"
+    for cause in CAUSES:
+        mine = [each for each in found if each.truth.cause == cause]
+        counts = [sum(each.verdict == said for each in mine) for said in ("sticks", "something else")]
+        gated = sum(bool(each.gated) for each in mine)
+        yield f"  {cause:20}{len(mine):6}{counts[0]:8}{counts[1]:6}{len(mine) - sum(counts) - gated:6}{gated:14}"
+    named = [each for each in found if each.truth.cause == "tight tuning" and each.verdict == "something else"]
+    yield f"  tight tuning is named so in {sum('tight' in each.cause for each in named)} of {len(named)}"
+
+
+def share(part: int, whole: int) -> str:
+    return f"{part}/{whole} = {100.0 * part / whole:.0f} %" if whole else "0/0"
+
+
+def of_labelled(folder: Path) -> list[Score]:
+    """Return the scores of loops with labels: OP, PV and SP, or OP alone, which only He's method reads."""
+    windows: dict[tuple[str, str, int, str], list[float]] = defaultdict(list)
+    with (folder / "labels.csv").open(encoding="utf-8") as file:
+        for row in csv.DictReader(file):
+            if row["sticks"] not in ("0", "1"):
+                continue
+            columns = np.genfromtxt(folder / row["file"], delimiter=",", names=True)
+            for method, score in _scored(row["loop"], columns, row.get("plant_index") or "").items():
+                windows[row["set"], row["loop"], int(row["sticks"]), method].append(score)
+    return [Score(*key, float(np.median(scores))) for key, scores in windows.items()]
+
+
+def _scored(name: str, columns: np.ndarray[Any, Any], index: str) -> dict[str, float]:
+    if "pv" not in (columns.dtype.names or ()):
+        period_s = float(np.median(np.diff(columns["time_s"])))
+        found = find_oscillation(columns["op"], period_s)
+        return {"He": he(columns["op"], found.period_s / period_s).index}
+    record = LoopRecord.of_samples(name, columns["time_s"], columns["op_pct"], columns["pv"], columns["sp"])
+    said = diagnose_loop(record)
+    scores = {OURS: UNKNOWN if said.probability is None else said.probability}
+    scores |= {vote.method: vote.index for vote in said.votes}
+    called = {"called at 95 %": float(said.verdict == "sticks")}
+    return scores | called | ({"plant's own index": float(index)} if index else {})
+
+
+def areas(scores: Sequence[Score]) -> Iterator[str]:
+    """Yield the area of each method on each set, by loop."""
+    for name in dict.fromkeys(each.set for each in scores):
+        of_set = [each for each in scores if each.set == name]
+        loops = {each.loop: each.sticks for each in of_set}
+        yield f"{name}: {len(loops)} loops, {sum(loops.values())} stick"
+        for method in dict.fromkeys(each.method for each in of_set):
+            mine = [each for each in of_set if each.method == method]
+            if method == "called at 95 %":
+                called = [each for each in mine if each.score >= 0.5]
+                yield f"  {method}: {len(called)}, wrong {sum(not each.sticks for each in called)}"
+            else:
+                yield f"  {method:20} AUC {area([e.score for e in mine], [e.sticks for e in mine]):.2f}"
+
+
+def calibration(found: Sequence[Judged]) -> Iterator[str]:
+    kept = [each for each in found if not each.gated]
+    evidence, shares = (np.array([getattr(each, name) for each in kept]) for name in ("evidence", "share"))
+    sticks = np.array([float(each.truth.cause == "sticks") for each in kept])
+    fitted = calibrate(evidence, shares, sticks)
+    yield f"{len(kept)} loops: {fitted}"
+    probability = np.array([fitted.probability(e, s) for e, s in zip(evidence, shares, strict=True)])
+    for least in (0.9, 0.93, 0.95, 0.97):
+        called = probability >= least
+        yield f"  at {least:g}: called {called.sum()}, wrong {int((called & (sticks == 0.0)).sum())}"
+    off = [
+        abs(np.log(each.stiction_pct / each.truth.stiction_pct))
+        for each, p in zip(kept, probability, strict=True)
+        if p >= LIMITS.sticks_probability and each.truth.cause == "sticks"
+    ]
+    yield f"  95 % of those called lie within {np.quantile(off, 0.95):.3f} in logarithm" if off else "  none called"
+
+
+def main() -> None:
+    parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
+    parser.add_argument("--drawn", type=int, default=300, metavar="N")
+    parser.add_argument("--data", type=Path, metavar="FOLDER")
+    parser.add_argument("--out", type=Path, metavar="FILE")
+    parser.add_argument("--scores", type=Path, metavar="FILE")
+    parser.add_argument("--calibrate", action="store_true")
+    arguments = parser.parse_args()
+    if arguments.scores:
+        with arguments.scores.open(encoding="utf-8") as file:
+            lines = list(csv.DictReader(file))
+        rows = [Score(r["set"], r["loop"], int(r["sticks"]), r["method"], float(r["score"])) for r in lines]
+        print(*areas(rows), sep="\n")
+        return
+    if arguments.calibrate:
+        print(*calibration(judged(arguments.drawn, CALIBRATION_SEEDS)), sep="\n")
+        return
+    scores: list[Score] = []
+    if arguments.drawn:
+        found = judged(arguments.drawn, 0)
+        print(*of_drawn(found), sep="\n")
+        scores += [
+            Score("drawn", str(each.truth.seed), int(each.truth.cause == "sticks"), method, each.scores[method])
+            for each in found
+            for method in METHODS
+            if method in each.scores
+        ]
+    if arguments.data:
+        scores += of_labelled(arguments.data)
+    print(*areas(scores), sep="\n")
+    if arguments.out:
+        with arguments.out.open("w", encoding="utf-8", newline="") as file:
+            writer = csv.writer(file)
+            writer.writerow(("set", "loop", "sticks", "method", "score"))
+            writer.writerows((s.set, s.loop, s.sticks, s.method, f"{s.score:.6g}") for s in scores)
+
+
+if __name__ == "__main__":
+    main()

@@ -1,0 +1,59 @@
+"""`positioner loops`: the loops of a plant, ranked by what their valves' friction costs."""
+
+import argparse
+import sys
+from pathlib import Path
+
+from positioner.cli.parts.output_files import writable, write_json
+
+HELP = "rank the loops of a plant from OP, PV and SP alone; exit status 1 if any valve sticks"
+EXAMPLE = "positioner loops plant.csv --report plant.html"
+
+
+def add_arguments(parser: argparse.ArgumentParser) -> None:
+    """Declare the command line."""
+    parser.add_argument("manifest", type=Path, metavar="MANIFEST", help="CSV: loop, file, and time, op, pv, sp, mode")
+    parser.add_argument("--workers", type=int, metavar="N", help="processes (one a core)")
+    parser.add_argument("--json", type=Path, metavar="FILE", help="write what was found as JSON, a list")
+    parser.add_argument("--report", type=Path, metavar="FILE.html", help="write the ranking as a page")
+
+
+def run(arguments: argparse.Namespace) -> int:
+    """Print the ranking; 1 if any valve sticks, else 0."""
+    from config.errors import InputError
+    from config.results.block import Table, as_text
+    from workbench.loops.loop_report import report_loops
+    from workbench.loops.plant import diagnose_plant, read_manifest
+    from workbench.report import require_plotly
+
+    writable(arguments.json, "--json")
+    writable(arguments.report, "--report")
+    if arguments.report is not None:
+        require_plotly(arguments.report)
+    if arguments.workers is not None and arguments.workers < 1:
+        raise InputError("--workers", f"must be 1 or more, got {arguments.workers}")
+    entries = read_manifest(arguments.manifest)
+    plant = diagnose_plant(entries, arguments.workers, lambda each: print(each.sentence, file=sys.stderr, flush=True))
+    if arguments.json is not None:
+        write_json(arguments.json, [each.as_json() for each in plant.ranked])
+    if arguments.report is not None:
+        report_loops(plant, arguments.report, arguments.manifest.name)
+    rows = [
+        (
+            each.record.name,
+            each.verdict,
+            "–" if each.probability is None else f"{100 * each.probability:.0f} %",
+            f"{100 * each.variance_cost:.2g} %",
+            each.cause or "; ".join(gate.says for gate in each.gates),
+        )
+        for each in plant.ranked
+    ]
+    print(as_text([Table(("loop", "", "sticks", "error's std", ""), rows)]))
+    for group in plant.groups:
+        print(
+            f"{', '.join(group.loops)} oscillate together, period {group.period_s:.4g} s; "
+            f"likeliest source {group.source}: {group.because}"
+        )
+    for name, why in plant.unreadable:
+        print(f"{name}: {why}", file=sys.stderr)
+    return 1 if plant.count("sticks") else 0

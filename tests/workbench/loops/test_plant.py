@@ -1,0 +1,78 @@
+from dataclasses import replace
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from benchmarks.drawn_loops import draw_loop
+from config.errors import InputError
+from workbench.loops import LoopDiagnosis, LoopRecord, diagnose_loop
+from workbench.loops.loop_report import report_loop, report_loops
+from workbench.loops.plant import Plant, find_groups, read_manifest
+
+
+@pytest.fixture(scope="module")
+def sticking() -> LoopDiagnosis:
+    loop = draw_loop(10, "sticks")
+    return diagnose_loop(LoopRecord.of_samples("FIC101", loop.time_s, loop.op_pct, loop.pv, loop.sp))
+
+
+@pytest.fixture(scope="module")
+def swinging() -> LoopDiagnosis:
+    loop = draw_loop(7, "external sine")
+    return diagnose_loop(LoopRecord.of_samples("<b>TIC7", loop.time_s, loop.op_pct, loop.pv, loop.sp))
+
+
+def test_loops_of_one_period_are_a_group_and_the_sticking_valve_is_its_source(
+    sticking: LoopDiagnosis, swinging: LoopDiagnosis
+) -> None:
+    regular = replace(sticking.oscillation, period_s=100.0, regularity=3.0)
+    loops = [
+        replace(sticking, oscillation=regular),
+        replace(swinging, oscillation=replace(regular, period_s=103.0)),
+        replace(swinging, oscillation=replace(regular, period_s=130.0)),
+        replace(swinging, oscillation=replace(regular, regularity=0.5)),
+    ]
+    (group,) = find_groups(loops)
+    assert group.loops == ("FIC101", "<b>TIC7")
+    assert group.source == "FIC101"
+
+
+def test_a_plants_page_has_a_line_a_loop_and_escapes_what_is_not_ours(
+    tmp_path: Path, sticking: LoopDiagnosis, swinging: LoopDiagnosis
+) -> None:
+    report_loops(Plant((sticking, swinging), (("LIC3", "is empty"),), ()), tmp_path / "p.html", "plant.csv")
+    page = (tmp_path / "p.html").read_text(encoding="utf-8")
+    assert "FIC101" in page
+    assert "LIC3" in page
+    assert "<b>TIC7" not in page
+
+
+def test_a_loops_page_shows_the_verdict_and_the_fitted_path(tmp_path: Path, sticking: LoopDiagnosis) -> None:
+    report_loop([sticking], tmp_path / "l.html")
+    page = (tmp_path / "l.html").read_text(encoding="utf-8")
+    assert sticking.sentence in page
+    assert "stick and slip" in page
+
+
+def test_the_loop_without_friction_swings_less_and_the_compensators_name_settings(sticking: LoopDiagnosis) -> None:
+    assert sticking.remedies is not None
+    by_name = {each.name: each for each in sticking.remedies.remedies}
+    assert by_name["maintenance"].error_ratio < 0.8
+    assert all(each.settings and np.isfinite([each.error_ratio, each.travel_ratio]).all() for each in by_name.values())
+
+
+@pytest.mark.parametrize(
+    ("lines", "said"),
+    [
+        ("loop;file\nA;a.csv\nA;b.csv\n", "names the loop A 2 times"),
+        ("loop,valve\nA,a.csv\n", "columns must be"),
+        ("loop,file\n", "names no loop"),
+        ("loop,file\nA,\n", "line 2"),
+    ],
+)
+def test_a_broken_manifest_is_said_in_a_line(tmp_path: Path, lines: str, said: str) -> None:
+    path = tmp_path / "m.csv"
+    path.write_text(lines)
+    with pytest.raises(InputError, match=said):
+        read_manifest(path)

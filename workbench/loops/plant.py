@@ -1,0 +1,146 @@
+"""Many loops: ranked by what they cost and how sure it is, and which of them oscillate together.
+
+A manifest is a CSV file: `loop,file`, and where the file does not say it by itself the columns `time,op,pv,sp,mode`; a
+file may be named by many loops. Loops that oscillate regularly with one period are a group; the likeliest source of it
+is the valve that sticks surest, else the loop with the most harmonics: friction makes them, and what is downstream of
+it filters them out (Thornhill and Hagglund 1997).
+"""
+
+import csv
+import os
+from collections.abc import Callable, Sequence
+from concurrent.futures import ProcessPoolExecutor
+from dataclasses import dataclass
+from pathlib import Path
+
+import numpy as np
+
+from config.errors import InputError
+from config.exports.loop_reader import ROLES, read_loop
+from config.plain_file import read_plain
+from workbench.loops.loop_diagnosis import LoopDiagnosis, diagnose_loop
+from workbench.loops.loop_record import LoopRecord
+from workbench.loops.oscillation import without_trend
+from workbench.loops.thresholds import LIMITS
+
+
+@dataclass(frozen=True, slots=True)
+class Entry:
+    """A line of the manifest: the loop's name, its file, and columns by role where they are named."""
+
+    loop: str
+    file: Path
+    named: tuple[tuple[str, str], ...]
+
+
+@dataclass(frozen=True, slots=True)
+class Group:
+    """Loops that oscillate together: their names, the period, s, the likeliest source and why."""
+
+    loops: tuple[str, ...]
+    period_s: float
+    source: str
+    because: str
+
+
+@dataclass(frozen=True, slots=True)
+class Plant:
+    """The loops of a plant, ranked, the first the one to look at; those of no record; groups."""
+
+    ranked: tuple[LoopDiagnosis, ...]
+    unreadable: tuple[tuple[str, str], ...]
+    groups: tuple[Group, ...]
+
+    def count(self, verdict: str) -> int:
+        """Return how many loops have a verdict."""
+        return sum(each.verdict == verdict for each in self.ranked)
+
+
+def read_manifest(path: Path) -> tuple[Entry, ...]:
+    """Read a manifest.
+
+    Raises:
+        InputError: it cannot be read, lacks a column, has one that is none, names no loop, or one twice.
+    """
+    lines = read_plain(path).splitlines()
+    reader = csv.DictReader(lines, delimiter=";" if lines and ";" in lines[0] else ",")
+    columns = [each.strip() for each in reader.fieldnames or ()]
+    if not {"loop", "file"} <= set(columns) <= {"loop", "file", *ROLES}:
+        raise InputError(str(path), f"columns must be loop, file, any of {', '.join(ROLES)}; got {', '.join(columns)}")
+    reader.fieldnames = columns
+    entries = []
+    for row in reader:
+        held = {key: (value or "").strip() for key, value in row.items() if isinstance(key, str)}
+        if not held["loop"] or not held["file"]:
+            raise InputError(str(path), f"line {reader.line_num}: loop and file must both be given")
+        named = tuple((role, held[role]) for role in ROLES if held.get(role))
+        entries.append(Entry(held["loop"], path.parent / held["file"], named))
+    names = [each.loop for each in entries]
+    if not entries:
+        raise InputError(str(path), "names no loop: under its first line stands a row for each")
+    if twice := next((name for name in names if names.count(name) > 1), None):
+        raise InputError(str(path), f"names the loop {twice} {names.count(twice)} times; allowed is once")
+    return tuple(entries)
+
+
+def diagnose_plant(entries: Sequence[Entry], workers: int | None, tell: Callable[[LoopDiagnosis], None]) -> Plant:
+    """Return the loops of a manifest, ranked; `tell` is given each as it is done."""
+    done: list[LoopDiagnosis] = []
+    unreadable: list[tuple[str, str]] = []
+    with ProcessPoolExecutor(max_workers=workers or os.cpu_count()) as pool:
+        for entry, found in zip(entries, pool.map(_diagnosed, entries, chunksize=1), strict=True):
+            if isinstance(found, str):
+                unreadable.append((entry.loop, found))
+            else:
+                done.append(found)
+                tell(found)
+    return Plant(tuple(sorted(done, key=_rank)), tuple(unreadable), tuple(find_groups(done)))
+
+
+def _diagnosed(entry: Entry) -> LoopDiagnosis | str:
+    try:
+        read = read_loop(entry.file, dict(entry.named))
+        return diagnose_loop(
+            LoopRecord.of_samples(entry.loop, read.time_s, read.op_pct, read.pv, read.sp, read.automatic)
+        )
+    except InputError as error:
+        return str(error)
+
+
+def _rank(each: LoopDiagnosis) -> tuple[bool, float]:
+    """Return what loops are sorted by: sticking ones first, each by probability times variance cost."""
+    return each.verdict != "sticks", -(each.probability or 0.0) * each.variance_cost
+
+
+def find_groups(loops: Sequence[LoopDiagnosis]) -> list[Group]:
+    """Return the groups of loops that oscillate together, the largest first."""
+    left = sorted((each for each in loops if each.oscillation.regular), key=lambda each: each.oscillation.period_s)
+    groups: list[Group] = []
+    while left:
+        first = left[0].oscillation.period_s
+        together = [each for each in left if each.oscillation.period_s <= first * (1.0 + LIMITS.together_period)]
+        left = left[len(together) :]
+        if len(together) > 1:
+            groups.append(_group(together))
+    return sorted(groups, key=lambda each: -len(each.loops))
+
+
+def _group(together: Sequence[LoopDiagnosis]) -> Group:
+    sticking = [each for each in together if each.verdict == "sticks"]
+    if sticking:
+        source, because = max(sticking, key=lambda each: each.probability or 0.0), "its valve sticks"
+    else:
+        source, because = max(together, key=harmonic_share), "it has the most harmonics"
+    period_s = float(np.median([each.oscillation.period_s for each in together]))
+    return Group(tuple(each.record.name for each in together), period_s, source.record.name, because)
+
+
+def harmonic_share(each: LoopDiagnosis) -> float:
+    """Return the power of PV at twice to five times the frequency of its oscillation, of that at all of them."""
+    values = without_trend(each.record.pv)
+    power = np.abs(np.fft.rfft(values * np.hanning(values.size))) ** 2
+    place = np.fft.rfftfreq(values.size, each.record.period_s) * each.oscillation.period_s
+    near = np.abs(place - np.round(place)) < 0.15
+    base = float(power[near & (np.round(place) == 1)].sum())
+    higher = float(power[near & (np.round(place) >= 2) & (np.round(place) <= 5)].sum())
+    return higher / max(base + higher, 1e-300)
