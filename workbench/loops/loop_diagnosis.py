@@ -15,7 +15,7 @@ from workbench.loops.controller_law import ControllerLaw, see_law
 from workbench.loops.loop_record import LoopRecord
 from workbench.loops.oscillation import Oscillation, find_oscillation
 from workbench.loops.quality_gates import Gate, closed_gates
-from workbench.loops.remedies import Remedies, find_remedies
+from workbench.loops.remedies import Remedy, find_remedies
 from workbench.loops.shape_methods import Vote, votes
 from workbench.loops.thresholds import LIMITS
 
@@ -40,7 +40,7 @@ class LoopDiagnosis(Result):
         causes: as they were held against each other; None where the record is insufficient.
         votes: of the literature's methods.
         sensitivity: greatest |1/(1+L)| of the identified loop, and its period, s; None where the law is not seen.
-        remedies: what to do about a valve that sticks; None where it does not, or the law is not seen.
+        remedies: what to do about a valve that sticks; none where it does not, or the law is not seen.
     """
 
     record: LoopRecord
@@ -54,7 +54,7 @@ class LoopDiagnosis(Result):
     causes: Causes | None
     votes: tuple[Vote, ...]
     sensitivity: tuple[float, float] | None
-    remedies: Remedies | None = None
+    remedies: tuple[Remedy, ...] = ()
 
     @property
     def variance_cost(self) -> float:
@@ -94,14 +94,9 @@ class LoopDiagnosis(Result):
                     [(name, f"{cost - least:.1f}") for name, cost in sorted(self.causes.costs.items(), key=_second)],
                 )
             )
-        if self.remedies is not None:
-            rows = [
-                (r.name, f"{r.error_ratio:.2f}", f"{r.travel_ratio:.2f}", r.settings) for r in self.remedies.remedies
-            ]
-            trust = (
-                "" if self.remedies.credible else " (a guess: the identified loop does not swing as the record does)"
-            )
-            said.append(Table(("what to do" + trust, "error", "travel", ""), rows, "simulated, of now:"))
+        if self.remedies:
+            rows = [(r.name, ratio(r.error_ratio), ratio(r.travel_ratio), r.settings) for r in self.remedies]
+            said.append(Table(("what to do", "error", "travel", ""), rows, REMEDIES))
         said.append(
             Table(("method of the literature", "index", ""), [(v.method, f"{v.index:.2f}", v.says) for v in self.votes])
         )
@@ -154,7 +149,7 @@ class LoopDiagnosis(Result):
             "insufficient": [{"code": g.code, "says": g.says, "instead": g.instead} for g in self.gates],
             "remedies": [
                 {"name": r.name, "settings": r.settings, "error_ratio": r.error_ratio, "travel_ratio": r.travel_ratio}
-                for r in (self.remedies.remedies if self.remedies else ())
+                for r in self.remedies
             ],
             "votes": {vote.method: {"index": vote.index, "says": vote.says} for vote in self.votes},
             "sentence": self.sentence,
@@ -174,7 +169,13 @@ class LoopDiagnosis(Result):
         return figure  # type: ignore[no-any-return]
 
 
+REMEDIES = "Of now, simulated on the identified loop; – where that does not swing as the record does:"
 OPEN = "a record with larger moves, or 20 more cycles, would tell; so would the stem's own position"
+
+
+def ratio(value: float | None) -> str:
+    """Return a ratio as people read it."""
+    return "–" if value is None else f"{value:.2f}"
 
 
 def diagnose_loop(record: LoopRecord) -> LoopDiagnosis:
@@ -198,15 +199,15 @@ def diagnose_loop(record: LoopRecord) -> LoopDiagnosis:
     elif probability <= LIMITS.other_probability:
         verdict, cause = "something else", _other(oscillation, setpoint, causes, sensitivity)
     treatable = verdict == "sticks" and law.seen and np.isfinite(law.reset_s)
-    remedies = _remedies(record, oscillation, law, causes) if treatable else None
+    remedies = _remedies(record, oscillation, law, causes) if treatable else ()
     return LoopDiagnosis(
         record, verdict, cause, probability, oscillation, setpoint, law, gates, causes, said, sensitivity, remedies
     )
 
 
-def _remedies(record: LoopRecord, oscillation: Oscillation, law: ControllerLaw, causes: Causes) -> Remedies | None:
+def _remedies(record: LoopRecord, oscillation: Oscillation, law: ControllerLaw, causes: Causes) -> tuple[Remedy, ...]:
     if causes.friction is None:
-        return None
+        return ()
     error = record.pv - (record.pv.mean() if record.sp is None else record.sp)
     path = fitted_path(record, oscillation, causes.friction)
     noise = float(np.diff(path.pv - path.pv_fitted).std() / np.sqrt(2.0))

@@ -11,7 +11,7 @@ from typing import Any
 import numpy as np
 
 from workbench.loops.causes import FittedPath, fitted_path
-from workbench.loops.loop_diagnosis import LoopDiagnosis
+from workbench.loops.loop_diagnosis import REMEDIES, LoopDiagnosis, ratio
 from workbench.loops.loop_record import Array
 from workbench.loops.oscillation import without_trend
 from workbench.loops.plant import Plant
@@ -126,18 +126,10 @@ def _stiction(each: LoopDiagnosis) -> str:
 
 def _verdict(each: LoopDiagnosis, name: str) -> Html:
     said = text(*each.record.notes)
-    if each.remedies is not None:
-        rows = [
-            Row((one.name, one.settings, f"{one.error_ratio:.2f}", f"{one.travel_ratio:.2f}"))
-            for one in each.remedies.remedies
-        ]
-        trust = (
-            "Simulated on the identified loop, which swings as the record does."
-            if each.remedies.credible
-            else "The identified loop, simulated, does not swing as the record does: take the figures as a guess."
-        )
+    if each.remedies:
+        rows = [Row((one.name, one.settings, ratio(one.error_ratio), ratio(one.travel_ratio))) for one in each.remedies]
         head = ("What to do", "Settings", "Error, of now", "Travel, of now")
-        said = Html(said + table(f"{name}-remedies", head, rows, (0, 1)) + text(trust))
+        said = Html(said + table(f"{name}-remedies", head, rows, (0, 1)) + text(REMEDIES.rstrip(":") + "."))
     return verdict(KIND[each.verdict], each.sentence, said)
 
 

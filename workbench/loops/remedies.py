@@ -8,8 +8,7 @@
     two moves           Srinivasan and Rengaswamy (2008): one lands the stem where the error asks, one rests it
 
 The noise is that of the record, white, at the size that the fit leaves. Reduction is of the control error's rms, travel
-is of the stem; both against the loop as it is, which must swing as the record does to be worth anything: `credible`
-says whether it does.
+is of the stem; both against the loop as it is, which must swing as the record does, or no figure is given.
 """
 
 from dataclasses import dataclass, replace
@@ -24,6 +23,8 @@ BEGIN = 500
 """Of these left out: the loop starts from rest."""
 KNOCK_EVERY, KNOCK_FOR = 6, 2
 """Samples; Hägglund: a period of 2 to 5 times the width, a width of 1 to 2 samples."""
+LIMIT_PCT = 50.0
+"""Of the output about where it works."""
 KICK = 2.0
 """Of f_s, where the integral part begins: a loop that begins at rest would stay there."""
 CREDIBLE = 2.0
@@ -37,22 +38,15 @@ class Remedy:
     Attributes:
         name: of it.
         settings: what to set, with units.
-        error_ratio: rms of the control error, of that of the loop as it is: an offset counts.
+        error_ratio: rms of the control error, of that of the loop as it is: an offset counts; None where the identified
+            loop does not swing as the record does.
         travel_ratio: travel of the stem, likewise.
     """
 
     name: str
     settings: str
-    error_ratio: float
-    travel_ratio: float
-
-
-@dataclass(frozen=True, slots=True)
-class Remedies:
-    """The remedies, and whether the simulated loop does as the record."""
-
-    remedies: tuple[Remedy, ...]
-    credible: bool
+    error_ratio: float | None
+    travel_ratio: float | None
 
 
 @dataclass(frozen=True, slots=True)
@@ -76,7 +70,7 @@ def find_remedies(
     process: tuple[float, float, float],
     noise: float,
     period_s: float,
-) -> Remedies:
+) -> tuple[Remedy, ...]:
     """Return the remedies of a loop.
 
     Args:
@@ -125,11 +119,13 @@ def find_remedies(
         ),
     ]
     error, travel = _simulated(loop, _Policy())
+    if not 1.0 / CREDIBLE < error / max(record_error, 1e-12) < CREDIBLE:
+        return tuple(Remedy(name, settings, None, None) for name, settings, _, _ in cases)
     found = []
     for name, settings, changed, policy in cases:
         now, way = _simulated(changed, policy)
         found.append(Remedy(name, settings, now / max(error, 1e-12), way / max(travel, 1e-12)))
-    return Remedies(tuple(found), 1.0 / CREDIBLE < error / max(record_error, 1e-12) < CREDIBLE)
+    return tuple(found)
 
 
 @dataclass(frozen=True, slots=True)
@@ -153,7 +149,7 @@ def _simulated(loop: _Loop, policy: _Policy) -> tuple[float, float]:
     for n in range(SAMPLES):
         error = -(pv + shocks[n])
         if abs(error) >= policy.dead_band:
-            integral += loop.integral * error
+            integral = min(max(integral + loop.integral * error, -LIMIT_PCT), LIMIT_PCT)
         output = loop.gain * error + integral
         command = output
         if policy.knock and n % KNOCK_EVERY < KNOCK_FOR:
@@ -163,13 +159,15 @@ def _simulated(loop: _Loop, policy: _Policy) -> tuple[float, float]:
             if wait <= 0 and abs(error) > policy.two_moves:
                 goal = stem + error / loop.process_gain
                 way = float(np.sign(goal - stem))
-                stem = goal  # the first move: beyond the goal by f_d, and past where it breaks loose
+                stem = min(
+                    max(goal, -LIMIT_PCT), LIMIT_PCT
+                )  # the first move: beyond the goal by f_d, and past where it breaks loose
                 held, wait = goal + loop.slides * way, settles
             command = held
         before = output
-        load = command - stem
+        load = min(max(command, -LIMIT_PCT), LIMIT_PCT) - stem
         if abs(load) > loop.breaks:
-            stem = command - loop.slides * float(np.sign(load))
+            stem += load - loop.slides * float(np.sign(load))
         line.append(stem)
         pv = loop.pole * pv + (1.0 - loop.pole) * loop.process_gain * line.pop(0)
         errors[n], stems[n] = error, stem

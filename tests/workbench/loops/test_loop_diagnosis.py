@@ -58,3 +58,12 @@ def test_lines_that_a_historian_drew_are_seen() -> None:
     rows = np.arange(record.pv.size)
     drawn = replace(record, pv=np.interp(rows, rows[::12], record.pv[::12]))
     assert "compressed" in [each.code for each in diagnose_loop(drawn).gates]
+
+
+def test_reversed_action_and_other_units_change_nothing() -> None:
+    record = record_of(draw_loop(10, "sticks"))
+    assert record.sp is not None
+    turned = replace(record, pv=500.0 - 7.0 * record.pv, sp=500.0 - 7.0 * record.sp)
+    found, again = diagnose_loop(record), diagnose_loop(turned)
+    assert found.law.action == -again.law.action == 1
+    assert found.probability == pytest.approx(again.probability, rel=1e-3)

@@ -1,7 +1,6 @@
 from dataclasses import replace
 from pathlib import Path
 
-import numpy as np
 import pytest
 
 from benchmarks.drawn_loops import draw_loop
@@ -56,10 +55,11 @@ def test_a_loops_page_shows_the_verdict_and_the_fitted_path(tmp_path: Path, stic
 
 
 def test_the_loop_without_friction_swings_less_and_the_compensators_name_settings(sticking: LoopDiagnosis) -> None:
-    assert sticking.remedies is not None
-    by_name = {each.name: each for each in sticking.remedies.remedies}
-    assert by_name["maintenance"].error_ratio < 0.8
-    assert all(each.settings and np.isfinite([each.error_ratio, each.travel_ratio]).all() for each in by_name.values())
+    by_name = {each.name: each for each in sticking.remedies}
+    without = by_name["maintenance"].error_ratio
+    assert without is not None
+    assert without < 0.8
+    assert all(each.settings for each in by_name.values())
 
 
 @pytest.mark.parametrize(
