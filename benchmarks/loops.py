@@ -43,7 +43,6 @@ class Judged:
     truth: Truth
     verdict: str
     gated: str
-    cause: str
     evidence: float
     share: float
     stiction_pct: float
@@ -73,7 +72,6 @@ def judge(loop: DrawnLoop) -> Judged:
         loop.truth,
         found.verdict,
         found.gates[0].code if found.gates else "",
-        found.cause,
         found.causes.evidence if found.causes else 0.0,
         found.causes.share if found.causes else 0.0,
         friction.stiction_pct if friction else 0.0,
@@ -114,8 +112,6 @@ def of_drawn(found: Sequence[Judged]) -> Iterator[str]:
         counts = [sum(each.verdict == said for each in mine) for said in ("sticks", "something else")]
         gated = sum(bool(each.gated) for each in mine)
         yield f"  {cause:20}{len(mine):6}{counts[0]:8}{counts[1]:6}{len(mine) - sum(counts) - gated:6}{gated:14}"
-    named = [each for each in found if each.truth.cause == "tight tuning" and each.verdict == "something else"]
-    yield f"  tight tuning is named so in {sum('tight' in each.cause for each in named)} of {len(named)}"
 
 
 def share(part: int, whole: int) -> str:

@@ -39,7 +39,6 @@ class LoopDiagnosis(Result):
         gates: why the record is insufficient.
         causes: as they were held against each other; None where the record is insufficient.
         votes: of the literature's methods.
-        sensitivity: greatest |1/(1+L)| of the identified loop, and its period, s; None where the law is not seen.
         remedies: what to do about a valve that sticks; none where it does not, or the law is not seen.
     """
 
@@ -53,7 +52,6 @@ class LoopDiagnosis(Result):
     gates: tuple[Gate, ...]
     causes: Causes | None
     votes: tuple[Vote, ...]
-    sensitivity: tuple[float, float] | None
     remedies: tuple[Remedy, ...] = ()
 
     @property
@@ -188,21 +186,18 @@ def diagnose_loop(record: LoopRecord) -> LoopDiagnosis:
     gates = closed_gates(record, oscillation)
     said = votes(record, oscillation) if np.ptp(record.op_pct) > 0.0 else ()
     if gates:
-        return LoopDiagnosis(record, "cannot be told", "", None, oscillation, setpoint, law, gates, None, said, None)
+        return LoopDiagnosis(record, "cannot be told", "", None, oscillation, setpoint, law, gates, None, said)
     causes = hold_causes(record, oscillation, law.action)
     probability = CALIBRATION.probability(causes.evidence, causes.share)
-    sensitivity = sensitivity_of(law, causes, record.period_s) if law.seen else None
     verdict: Verdict = "cannot be told"
     cause = ""
     if probability >= LIMITS.sticks_probability and causes.friction:
         verdict = "sticks"
     elif probability <= LIMITS.other_probability:
-        verdict, cause = "something else", _other(oscillation, setpoint, causes, sensitivity)
+        verdict, cause = "something else", _other(oscillation, setpoint, causes)
     treatable = verdict == "sticks" and law.seen and np.isfinite(law.reset_s)
     remedies = _remedies(record, oscillation, law, causes) if treatable else ()
-    return LoopDiagnosis(
-        record, verdict, cause, probability, oscillation, setpoint, law, gates, causes, said, sensitivity, remedies
-    )
+    return LoopDiagnosis(record, verdict, cause, probability, oscillation, setpoint, law, gates, causes, said, remedies)
 
 
 def _remedies(record: LoopRecord, oscillation: Oscillation, law: ControllerLaw, causes: Causes) -> tuple[Remedy, ...]:
@@ -215,34 +210,19 @@ def _remedies(record: LoopRecord, oscillation: Oscillation, law: ControllerLaw, 
     return find_remedies(float(np.sqrt((error**2).mean())), law, causes.friction, process, noise, record.period_s)
 
 
-def _other(
-    oscillation: Oscillation, setpoint: Oscillation | None, causes: Causes, sensitivity: tuple[float, float] | None
-) -> str:
-    """Return what else moves a loop whose valve does not stick."""
+def _other(oscillation: Oscillation, setpoint: Oscillation | None, causes: Causes) -> str:
+    """Return what else moves a loop whose valve does not stick.
+
+    Tight tuning and an oscillation from outside are not told apart: where one frequency rules, PV over OP at it is
+    minus the controller's inverse in both.
+    """
     if setpoint is not None:
         return "PV follows a set point that moves"
     if not oscillation.regular:
         return "irregular disturbances, which the valve answers"
-    if sensitivity is not None and sensitivity[0] > LIMITS.tight_sensitivity:
-        ratio = sensitivity[1] / oscillation.period_s
-        if 1.0 / LIMITS.tight_period < ratio < LIMITS.tight_period:
-            return f"tight tuning: the loop swings by itself (sensitivity {sensitivity[0]:.0f})"
     curved = causes.costs["linear"] - causes.costs["nonlinear"] > 2.0 * LIMITS.interval_cost
-    return "a regular disturbance from outside" + (", through a curved process or valve" if curved else "")
-
-
-def sensitivity_of(law: ControllerLaw, causes: Causes, period_s: float) -> tuple[float, float]:
-    """Return the greatest |1 / (1 + C G)| of the identified loop, and the period at which it stands, s.
-
-    C = K (1 + 1/(T_i s)), G = g exp(-theta s) / (1 + T s); half a sampling period is added to the dead time.
-    """
-    angular = 2.0 * np.pi / np.geomspace(2.0 * period_s, 4000.0 * period_s, 2000)
-    s = 1j * angular
-    integral = 1.0 / (law.reset_s * s) if np.isfinite(law.reset_s) else 0.0
-    loop = law.gain * (1.0 + integral) * causes.gain * np.exp(-s * (causes.delay_s + 0.5 * period_s))
-    sensitivity = np.abs(1.0 / (1.0 + loop / (1.0 + causes.lag_s * s)))
-    at = int(np.argmax(sensitivity))
-    return float(sensitivity[at]), float(2.0 * np.pi / angular[at])
+    through = ", through a curved process or valve" if curved else ""
+    return f"tight tuning, or an oscillation from outside{through}: in manual it stops, or goes on"
 
 
 def _second(item: tuple[str, float]) -> float:

@@ -46,10 +46,6 @@ class Thresholds:
     """Of the autoregressive disturbance: two resonances, an oscillation from outside and its harmonic or a drift."""
     law_is_seen: float = 0.5
     """Share of OP's changes that a PI law explains, from which on the law is taken as seen."""
-    tight_sensitivity: float = 4.0
-    """Greatest |1/(1+L)|: ordinary tuning has 1.4 to 2; at 4 the loop swings by itself (gain margin 1.33)."""
-    tight_period: float = 1.5
-    """Ratio of the oscillation's period to that of the greatest sensitivity within which they are one."""
     sticks_probability: float = 0.97
     """At which a loop is called sticking at 95 %: at 0.95 itself 3 of 58 of the calibration's loops were wrong."""
     other_probability: float = 0.25
