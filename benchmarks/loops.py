@@ -2,7 +2,7 @@
 
     drawn loops    with truth (`benchmarks.drawn_loops`), of seeds that did not calibrate
     FOLDER         loops of others with labels, fetched by whoever runs it: labels.csv (file, loop, sticks, set) and
-                   files (time_s, op_pct or op, pv, sp); by loop: the median of its windows
+                   files (time_s, op_pct or op, pv, sp); by loop, never by window
 
 Every method gives a score a loop, higher where it says sticks. `--out FILE` writes them; `--scores FILE` judges those
 of another method in the same form: a CSV file of set, loop, sticks, method, score. `--calibrate` prints what
@@ -17,14 +17,15 @@ from collections.abc import Iterator, Sequence
 from concurrent.futures import ProcessPoolExecutor
 from dataclasses import dataclass
 from pathlib import Path
-from typing import Any, cast
+from typing import cast
 
 import numpy as np
 from numba import njit
 
 from benchmarks.drawn_loops import CAUSES, DrawnLoop, Simulate, Truth, draw_loops, simulate
-from workbench.loops import LoopRecord, diagnose_loop
+from workbench.loops import LoopDiagnosis, LoopRecord, diagnose_loop
 from workbench.loops.calibration import calibrate
+from workbench.loops.joint import together
 from workbench.loops.oscillation import find_oscillation
 from workbench.loops.shape_methods import he
 from workbench.loops.thresholds import LIMITS
@@ -119,29 +120,37 @@ def share(part: int, whole: int) -> str:
 
 
 def of_labelled(folder: Path) -> list[Score]:
-    """Return the scores of loops with labels: OP, PV and SP, or OP alone, which only He's method reads."""
-    windows: dict[tuple[str, str, int, str], list[float]] = defaultdict(list)
+    """Return the scores of loops with labels: OP, PV and SP, or OP alone, which only He's method reads.
+
+    Ours adds the evidence of a loop's windows; of the others the median of its windows is taken.
+    """
+    windows: dict[tuple[str, str, int], list[dict[str, float]]] = defaultdict(list)
+    said: dict[tuple[str, str, int], list[LoopDiagnosis]] = defaultdict(list)
     with (folder / "labels.csv").open(encoding="utf-8") as file:
-        for row in csv.DictReader(file):
-            if row["sticks"] not in ("0", "1"):
-                continue
-            columns = np.genfromtxt(folder / row["file"], delimiter=",", names=True)
-            for method, score in _scored(row["loop"], columns, row.get("plant_index") or "").items():
-                windows[row["set"], row["loop"], int(row["sticks"]), method].append(score)
-    return [Score(*key, float(np.median(scores))) for key, scores in windows.items()]
-
-
-def _scored(name: str, columns: np.ndarray[Any, Any], index: str) -> dict[str, float]:
-    if "pv" not in (columns.dtype.names or ()):
-        period_s = float(np.median(np.diff(columns["time_s"])))
-        found = find_oscillation(columns["op"], period_s)
-        return {"He": he(columns["op"], found.period_s / period_s).index}
-    record = LoopRecord.of_samples(name, columns["time_s"], columns["op_pct"], columns["pv"], columns["sp"])
-    said = diagnose_loop(record)
-    scores = {OURS: UNKNOWN if said.probability is None else said.probability}
-    scores |= {vote.method: vote.index for vote in said.votes}
-    called = {"called at 95 %": float(said.verdict == "sticks")}
-    return scores | called | ({"plant's own index": float(index)} if index else {})
+        rows = [row for row in csv.DictReader(file) if row["sticks"] in ("0", "1")]
+    for row in rows:
+        key = (row["set"], row["loop"], int(row["sticks"]))
+        columns = np.genfromtxt(folder / row["file"], delimiter=",", names=True)
+        if "pv" not in (columns.dtype.names or ()):
+            period_s = float(np.median(np.diff(columns["time_s"])))
+            found = find_oscillation(columns["op"], period_s)
+            windows[key].append({"He": he(columns["op"], found.period_s / period_s).index})
+            continue
+        names = ("time_s", "op_pct", "pv", "sp")
+        each = diagnose_loop(LoopRecord.of_samples(row["loop"], *(columns[name] for name in names)))
+        said[key].append(each)
+        index = {"plant's own index": float(row["plant_index"])} if row.get("plant_index") else {}
+        windows[key].append({vote.method: vote.index for vote in each.votes} | index)
+    scores = []
+    for key, found_in in said.items():
+        joint = together(found_in)
+        scores.append(Score(*key, OURS, UNKNOWN if joint.probability is None else joint.probability))
+        print(f"  {'sticks' if key[2] else '':7}{joint.sentence}")
+    for key, of_loop in windows.items():
+        for method in dict.fromkeys(name for window in of_loop for name in window):
+            known = [window[method] for window in of_loop if method in window]
+            scores.append(Score(*key, method, float(np.median(known))))
+    return scores
 
 
 def areas(scores: Sequence[Score]) -> Iterator[str]:
@@ -152,11 +161,10 @@ def areas(scores: Sequence[Score]) -> Iterator[str]:
         yield f"{name}: {len(loops)} loops, {sum(loops.values())} stick"
         for method in dict.fromkeys(each.method for each in of_set):
             mine = [each for each in of_set if each.method == method]
-            if method == "called at 95 %":
-                called = [each for each in mine if each.score >= 0.5]
-                yield f"  {method}: {len(called)}, wrong {sum(not each.sticks for each in called)}"
-            else:
-                yield f"  {method:20} AUC {area([e.score for e in mine], [e.sticks for e in mine]):.2f}"
+            called = [each for each in mine if each.score >= LIMITS.sticks_probability]
+            wrong = sum(not each.sticks for each in called)
+            told = f"; called {len(called)}, wrong {wrong}" if method == OURS else ""
+            yield f"  {method:20} AUC {area([e.score for e in mine], [e.sticks for e in mine]):.2f}{told}"
 
 
 def calibration(found: Sequence[Judged]) -> Iterator[str]:

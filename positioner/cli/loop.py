@@ -13,6 +13,7 @@ EXAMPLE = "positioner loop FIC101.csv --report loop.html"
 def add_arguments(parser: argparse.ArgumentParser) -> None:
     """Declare the command line."""
     parser.add_argument("recording", type=Path, nargs="+", metavar="REC", help="a historian's export: time, OP, PV, SP")
+    parser.add_argument("--together", action="store_true", help="the records are of one valve: their evidence is added")
     parser.add_argument("--json", type=Path, metavar="FILE", help="write what was found as JSON, a list")
     parser.add_argument("--report", type=Path, metavar="FILE.html", help="write it as a page")
     add_loop_arguments(parser)
@@ -20,8 +21,11 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
 
 def run(arguments: argparse.Namespace) -> int:
     """Print the verdict of each loop; 0 if every valve is without fault, else 1."""
+    from dataclasses import asdict
+
     from positioner.cli.parts.progress import at_work
     from workbench.loops import diagnose_loop
+    from workbench.loops.joint import together
     from workbench.loops.loop_report import report_loop
     from workbench.report import require_plotly
 
@@ -35,8 +39,12 @@ def run(arguments: argparse.Namespace) -> int:
         with at_work("loop", f"holding causes against each other on {record.pv.size} samples"):
             found.append(diagnose_loop(record))
         print(found[-1].summary())
+    joint = together(found) if arguments.together else None
+    if joint is not None:
+        print(joint.sentence)
     if arguments.json is not None:
-        write_json(arguments.json, [each.as_json() for each in found])
+        more = [] if joint is None else [{"together": True, **asdict(joint), "sentence": joint.sentence}]
+        write_json(arguments.json, [*(each.as_json() for each in found), *more])
     if arguments.report is not None:
         report_loop(found, arguments.report)
     return 0 if all(each.verdict == "something else" for each in found) else 1

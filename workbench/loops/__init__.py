@@ -7,6 +7,7 @@ The loop is never simulated: the controller's output is on record and is fed to 
 answers: sticks (how much, how sure), something else (what), cannot be told (why, and what to record instead).
 
     loop_diagnosis      puts it together: the verdict on one loop
+    joint               several records of one valve taken together
     loop_record         the samples of a loop on an even clock
     quality_gates       what a record cannot tell, before anything is worked out
     oscillation         the period and how regular it is; the time scale of a loop

@@ -81,8 +81,12 @@ class Causes:
     @property
     def share(self) -> float:
         """What friction alone explains, of all that the output explains of PV with it, 0 to 1."""
-        explained = self.costs["disturbance"] - self.costs["friction"]
-        return min(1.0, max(0.0, self.evidence) / explained) if np.isfinite(explained) and explained > 0.0 else 0.0
+        return min(1.0, max(0.0, self.evidence) / self.explained) if self.explained > 0.0 else 0.0
+
+    @property
+    def explained(self) -> float:
+        """What friction explains beyond the disturbance alone, nats; 0 where no stem is allowed."""
+        return max(0.0, self.costs["disturbance"] - self.costs["friction"]) if self.friction else 0.0
 
 
 @dataclass(frozen=True, slots=True)

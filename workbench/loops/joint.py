@@ -1,0 +1,67 @@
+"""Several records of one valve taken together: log-likelihoods of independent records add.
+
+    E = sum of E_i,    q = E / sum of what friction explains in each
+
+One record with a set-point step tells more than ten at rest; which it was need not be known beforehand. S is the median
+of the records, each weighted by its evidence; its interval holds 95 % of that weight, and no less than one record's.
+"""
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+
+import numpy as np
+
+from workbench.loops.calibration import CALIBRATION
+from workbench.loops.loop_diagnosis import LoopDiagnosis
+from workbench.loops.thresholds import LIMITS
+
+
+@dataclass(frozen=True, slots=True)
+class Joint:
+    """What records of one valve say together.
+
+    Attributes:
+        name: of the loop.
+        records: how many were compared; those that are insufficient are left out.
+        probability: that the valve sticks; None where all are insufficient.
+        stiction_pct, low_pct, high_pct: apparent stiction and its 95 % interval; None where no record has evidence.
+    """
+
+    name: str
+    records: int
+    probability: float | None
+    stiction_pct: tuple[float, float, float] | None
+
+    @property
+    def sentence(self) -> str:
+        """The whole in one line."""
+        of = f"{self.name}, {self.records} records together"
+        if self.probability is None:
+            return f"{of}: insufficient"
+        if self.probability < LIMITS.sticks_probability or self.stiction_pct is None:
+            return f"{of}: not said to stick ({100 * self.probability:.0f} % sticks)"
+        size, low, high = self.stiction_pct
+        return (
+            f"{of}: the valve sticks ({min(99.0, 100 * self.probability):.0f} %): "
+            f"apparent stiction {size:.2g} % of the output ({low:.2g} to {high:.2g})"
+        )
+
+
+def together(found: Sequence[LoopDiagnosis]) -> Joint:
+    """Return what records of one valve say together."""
+    causes = [each.causes for each in found if each.causes is not None and each.causes.friction is not None]
+    name = found[0].record.name
+    if not causes:
+        return Joint(name, 0, None, None)
+    evidence = sum(each.evidence for each in causes)
+    explained = sum(each.explained for each in causes)
+    share = min(1.0, max(0.0, evidence) / max(explained, 1e-12))
+    sized = [(each.friction.stiction_pct, each.evidence) for each in causes if each.friction and each.evidence > 0.0]
+    size = None
+    if sized:
+        sizes, weights = np.array(sorted(sized)).T
+        place = np.cumsum(weights) / weights.sum()
+        low, middle, high = (float(sizes[int(np.searchsorted(place, at))]) for at in (0.025, 0.5, 0.975))
+        factor = float(np.exp(LIMITS.least_interval))
+        size = (middle, min(low, middle / factor), max(high, middle * factor))
+    return Joint(name, len(causes), CALIBRATION.probability(evidence, share), size)
