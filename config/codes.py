@@ -69,8 +69,8 @@ class Fault(Code):
 
     NONE = 0, "none"
     NO_REPLY = 1, "no reply"
-    STALE = 2, "stale"
-    IMPLAUSIBLE = 3, "implausible"
+    STALE = 2, "the measurement has stood still"
+    IMPLAUSIBLE = 3, "a measurement that cannot be"
     DEVICE = 4, "the device said that it is unfit"
     RESTARTED = 5, "device restarted, or missed commands: it is back with another than the last one it was given"
     DCS_SILENT = 6, "DCS silent"

@@ -52,6 +52,8 @@ OF_DRIVES = tuple(
     for moved in ("position_m", "velocity_m_per_s")
 )
 """The same of drives."""
+OF_FORCES, OF_CURVES = ("time_s", "pressure_pa", "position_m", "load_n"), ("branch", "pressure_pa", "position_m")
+"""The same where a bench measures what the stem is moved by: over time, and in static curves."""
 KIND, INTEGRATED = "drive", "position"
 """Keys of what is said of a drive's: its kind; where its position comes from."""
 NOT_MEASURED = "not measured"
@@ -59,6 +61,8 @@ MOST_MEASURED = 1e12
 """In SI: what is beyond it, either way, stands for no measurement, as 3.4e38 does."""
 CLOCK_STEPS_TOLERATED = 0.01
 """Part of the rows at which a clock may be set back before the time is no clock at all."""
+FEW_CLOCK_STEPS = 10
+"""So often it may be in however short a recording: several may have been joined."""
 
 LONGEST_LINE, MOST_CHARACTERS = 1_000_000, 10_000_000_000
 """Of a compressed recording; of any, the longest first line."""
@@ -72,7 +76,12 @@ NUMBERS = "biufO"
 
 @dataclass(frozen=True, slots=True, repr=False)
 class Recording(Result):
-    """Columns of equal length, (n,), by name, and what was said about them."""
+    """Columns of equal length, (n,), by name, and what was said about them.
+
+    Raises:
+        InputError: a required column is missing, one is no series of numbers or of another length, or time runs back;
+            here and there a clock may have been set back, which the workbench cuts there.
+    """
 
     columns: Mapping[str, Column]
     metadata: Mapping[str, str] = field(default_factory=dict)
@@ -80,7 +89,11 @@ class Recording(Result):
     def __post_init__(self) -> None:
         if not hasattr(self.columns, "items"):
             raise InputError("recording", f"allowed are columns by their names, got {self.columns!r}")
-        object.__setattr__(self, "columns", {name: _numbers(name, given) for name, given in self.columns.items()})
+        columns = {name: _numbers(name, given) for name, given in self.columns.items()}
+        _require_columns(columns)
+        _require_lengths(columns)
+        _require_order(columns)
+        object.__setattr__(self, "columns", columns)
 
     @classmethod
     def of(cls, columns: Mapping[str, Column], metadata: Mapping[str, str]) -> Self:
@@ -212,6 +225,33 @@ def period_text(period_s: float) -> str:
     ('5 ms', '60 s')
     """
     return f"{period_s:.4g} s" if period_s >= 1.0 else f"{1e3 * period_s:.4g} ms"
+
+
+def _require_columns(columns: Mapping[str, Column]) -> None:
+    missing = [name for name in REQUIRED if name not in columns]
+    if missing and not any(set(each) <= columns.keys() for each in (BEHIND_POSITIONER, OF_FORCES, OF_CURVES)):
+        missing = [name for name in OF_FORCES if name not in columns] if "load_n" in columns else missing
+        raise InputError("recording", f"column {missing[0]} is missing; there are: {', '.join(columns) or 'none'}")
+
+
+def _require_lengths(columns: Mapping[str, Column]) -> None:
+    first, count = next((name, column.size) for name, column in columns.items())
+    for name, column in columns.items():
+        if column.size != count:
+            raise InputError("recording", f"{name} holds {column.size} values, {first} {count}")
+
+
+def _require_order(columns: Mapping[str, Column]) -> None:
+    if "time_s" not in columns:
+        return
+    time_s = columns["time_s"]
+    back = np.flatnonzero(np.diff(time_s) <= 0.0)
+    if back.size > max(FEW_CLOCK_STEPS, CLOCK_STEPS_TOLERATED * time_s.size):
+        at = int(back[0]) + 1
+        first = f"sample {at + 1} is at {time_s[at]:.9g} s after {time_s[at - 1]:.9g} s"
+        raise InputError(
+            "recording", f"time_s must increase: it does not at {back.size} of {time_s.size} samples; {first}"
+        )
 
 
 def _numbers(name: str, given: ArrayLike) -> Column:

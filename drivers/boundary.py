@@ -13,6 +13,7 @@ class Reading:
     """What the device said in one transaction. None is what this device does not offer."""
 
     position_m: float
+    """Counted in the direction in which pressure drives the stem."""
     pressure_pa: float | None = None
     sample_counter: int | None = None
     device_time_s: float | None = None

@@ -27,7 +27,6 @@ def run(arguments: argparse.Namespace) -> int:
     from config.errors import InputError
     from config.exports.own_format import own_recording
     from config.exports.plausibility import oddities
-    from config.recording import Recording
     from positioner.cli.parts.breaking_off import told_when_broken_off
     from positioner.cli.parts.output_files import recording_writable
     from positioner.cli.parts.progress import Progress
@@ -42,11 +41,12 @@ def run(arguments: argparse.Namespace) -> int:
         with told_when_broken_off("import", lambda: progress.known):
             recording = read_mapped(arguments.file, arguments, None, progress)
     else:
-        recording = own_recording(arguments.file) or Recording({})
-        if not recording.columns:
+        own = own_recording(arguments.file)
+        if own is None:
             if arguments.out is not None:
                 raise InputError("-o", "needs to know the columns: --column; without -o this command proposes them")
             return _list(arguments)
+        recording = own
     print(f"{arguments.file}: {recording.summary()}")
     for said in oddities(recording, arguments.stroke_m):
         print(f"look: {said}")

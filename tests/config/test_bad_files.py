@@ -144,7 +144,7 @@ def test_an_output_to_nowhere_is_one_line(out: str, tmp_path: Path, capsys: pyte
     assert printed.startswith(f"positioner simulate: -o {path}: cannot be written: ")
     assert printed.count("\n") == 1
     with pytest.raises(InputError, match="cannot be written: "):
-        Recording({}).write(path)
+        Recording({name: np.zeros(1) for name in ("time_s", "command_pa", "position_m")}).write(path)
 
 
 def test_an_output_that_is_the_input_is_refused_and_left_as_it_was(

@@ -138,6 +138,33 @@ def test_what_is_no_column_of_numbers_is_refused_by_name(given: Any, got: str) -
     assert f"time_s: allowed is one number a sample, NaN where none is known, got {got}" in str(caught.value)
 
 
+@pytest.mark.parametrize(
+    ("changed", "said"),
+    [
+        ({"position_m": None}, "column position_m is missing; there are: time_s, command_pa"),
+        ({"position_m": [0.0, 1.0]}, "position_m holds 2 values, time_s 5"),
+        (
+            {name: np.zeros(15) for name in ("time_s", "command_pa", "position_m")},
+            "time_s must increase: it does not at 14 of 15 samples; sample 2 is at 0 s after 0 s",
+        ),
+    ],
+)
+def test_what_is_no_recording_is_refused_when_it_is_made(changed: dict[str, Any], said: str) -> None:
+    """It was found minutes later, by another name, or not at all."""
+    whole = {"time_s": np.arange(5.0), "command_pa": np.zeros(5), "position_m": np.zeros(5)}
+    with pytest.raises(InputError) as caught:
+        Recording({name: each for name, each in (whole | changed).items() if each is not None})
+    assert str(caught.value) == f"recording: {said}"
+
+
+def test_a_recording_behind_a_positioner_of_forces_and_with_a_clock_set_back_once_are_ones() -> None:
+    time_s = np.concatenate([np.arange(100.0), np.arange(90.0, 190.0)])
+    one = np.zeros(200)
+    assert len(Recording({"time_s": time_s, "reference_m": one, "position_m": one})) == 200
+    assert Recording({"time_s": time_s, "pressure_pa": one, "position_m": one, "load_n": one}).columns
+    assert Recording({"branch": one, "pressure_pa": one, "position_m": one}).columns
+
+
 def test_a_file_of_zeros_is_refused_by_its_beginning(tmp_path: Path) -> None:
     path = tmp_path / "zeros.csv"
     with path.open("wb") as file:

@@ -219,9 +219,11 @@ def test_what_is_not_installed_is_named_with_its_extra(missing: str, asked: str,
 @pytest.mark.parametrize(
     "make",
     [
-        lambda: pos.Recording({}),
-        lambda: pos.Recording({"time_s": np.array([1.0]), "position_m": np.array([np.nan])}),
-        lambda: pos.respond(pos.Recording({name: np.zeros(9) for name in ("time_s", "command_pa", "position_m")})),
+        lambda: pos.Recording({name: np.array([]) for name in ("time_s", "command_pa", "position_m")}),
+        lambda: pos.Recording({name: np.array([np.nan]) for name in ("time_s", "command_pa", "position_m")}),
+        lambda: pos.respond(
+            pos.Recording({"time_s": np.arange(9.0), "command_pa": np.zeros(9), "position_m": np.zeros(9)})
+        ),
     ],
 )
 def test_of_nothing_there_is_still_something_to_say(make: Callable[[], Result]) -> None:

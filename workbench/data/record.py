@@ -19,7 +19,7 @@ from config.drive import KINDS, VALVE, KindName
 from config.errors import InputError
 from config.exports.plausibility import in_each_others_place
 from config.noise import frozen, held_back_m, quantum_m
-from config.recording import BEHIND_POSITIONER, CLOCK_STEPS_TOLERATED, REQUIRED, Column, Recording
+from config.recording import BEHIND_POSITIONER, REQUIRED, Column, Recording
 from config.results.result import Brief
 from config.valve_file import ValveParameters
 from workbench.data.clocks import Early, early
@@ -33,8 +33,6 @@ UNEVEN = 0.05
 """Sampling is uneven if its periods spread by more than this part of their median."""
 SHORTEST = 4
 """Samples of a segment worth simulating."""
-FEW_STEPS = 10
-"""So often a clock may be set back, in however short a recording: several may have been joined."""
 LIKELY_SPIKE = 8.0
 """Times the least scatter that a spike stands off at least."""
 UNSEEN = 1e-3
@@ -338,14 +336,8 @@ def _require_columns(columns: Mapping[str, Column]) -> None:
     count = len(columns["time_s"])
     if not count:
         raise InputError("recording", "holds no samples")
-    for name, column in columns.items():
-        if len(column) != count:
-            raise InputError("recording", f"{name} holds {len(column)} values, time_s {count}: one a sample is needed")
     if not np.isfinite(columns["time_s"]).all():
         raise InputError("recording", "time_s: not every sample is a number")
-    set_back = int(np.sum(np.diff(columns["time_s"]) <= 0.0))
-    if set_back > max(FEW_STEPS, CLOCK_STEPS_TOLERATED * count):
-        raise InputError("recording", f"time_s must increase: it does not at {set_back} of {count} samples")
 
 
 def _without_words(command: Column, name: str, of_valve: bool, notes: list[str]) -> Column:

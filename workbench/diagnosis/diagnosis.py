@@ -287,10 +287,10 @@ def diagnose(
         experiment=chosen,
         split=parts,
         given=given,
-        sentence=verdict_sentence(found, best, steps, library, parts, given)
+        sentence=(f"{_capital(asked.kept_mass.sentence)}. " if asked.kept_mass else "")
+        + verdict_sentence(found, best, steps, library, parts, given)
         + (f" {asked.stand_in.sentence}." if asked.stand_in else "")
         + "".join(f" But {each.sentence(best.fit.kind)}." for each in moved)
-        + (f" But {asked.kept_mass.sentence}." if asked.kept_mass else "")
         + (f" But {asked.by_pressure.sentence(best.fit.kind)}." if asked.by_pressure else "")
         + (f" But {asked.scale.sentence(best.fit.kind)}." if asked.scale else "")
         + (f" But {asked.by_command.sentence(best.fit.kind)}." if asked.by_command else ""),
@@ -303,6 +303,10 @@ def diagnose(
         pressure_scale=asked.scale,
         stand_in=asked.stand_in,
     )
+
+
+def _capital(sentence: str) -> str:
+    return sentence[0].upper() + sentence[1:]
 
 
 class Asked(NamedTuple):
