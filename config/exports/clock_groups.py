@@ -16,11 +16,10 @@ from pathlib import Path
 
 from config.errors import InputError
 from config.exports.cell_kinds import may_be_clock
-from config.exports.column_names import COUNTER, STATUS, rank_by_name
+from config.exports.column_names import rank_by_name
 from config.exports.header_search import ColumnMissing, Header, find_header, guess_header, matches, with_units
-from config.exports.number_notation import is_numeral
 from config.exports.raw_table import Cell, RawTable
-from config.exports.turned_tables import table_of_signal, turned
+from config.exports.turned_tables import cells_at, table_of_signal, turned, value_places
 
 DISTINCT = 0.4
 """Part of a clock's times that differ: two rows of a second are so many."""
@@ -98,7 +97,7 @@ def clock_places(header: Header) -> list[int]:
         index
         for index, name in enumerate(written)
         if again[index] or rank_by_name("time_s", name) is not None
-        if may_be_clock(cells := _cells(rows, index)) and (again[index] or _mostly_distinct(cells))
+        if may_be_clock(cells := cells_at(rows, index)) and (again[index] or _mostly_distinct(cells))
     ]
 
 
@@ -108,17 +107,10 @@ def _mostly_distinct(cells: Sequence[Cell]) -> bool:
     return len(set(held)) > DISTINCT * len(held)
 
 
-def value_places(header: Header) -> list[int]:
-    """Return which columns of a table hold a signal: numbers, and neither a clock's, a quality's nor the rows'."""
-    rows, clocks = _first_rows(header), clock_places(header)
-    found = []
-    for index, name in enumerate(header.names):
-        held = [cell for cell in _cells(rows, index) if cell != ""]
-        numbers = sum(isinstance(cell, float) or is_numeral(cell) for cell in held)
-        other = index in clocks or STATUS.search(name) or COUNTER.search(name) or rank_by_name("time_s", name) == 0
-        if held and 2 * numbers > len(held) and not other:
-            found.append(index)
-    return found
+def signal_places(header: Header) -> list[int]:
+    """Return which columns of a table hold a signal."""
+    clocks = clock_places(header)
+    return [index for index in value_places(header, _first_rows(header)) if index not in clocks]
 
 
 def _first_rows(header: Header) -> list[list[Cell]]:
@@ -126,10 +118,6 @@ def _first_rows(header: Header) -> list[list[Cell]]:
         row for line, row in header.table.rows() if line > header.samples_after and any(cell != "" for cell in row)
     )
     return list(islice(after, LOOKED_AT))
-
-
-def _cells(rows: Sequence[Sequence[Cell]], index: int) -> list[Cell]:
-    return [row[index] for row in rows if index < len(row)]
 
 
 def _in_tables_of_their_own(
@@ -165,7 +153,7 @@ def _with_its_clock(
             continue
     for number, table in enumerate(tables):
         if _same(table.sheet, name) and (header := guess_header([table])):
-            values = value_places(header)
+            values = signal_places(header)
             if len(values) == 1 and (found := _by_its_clock(header, clock, name, values[0])):
                 return number, found
     for number, table in enumerate(tables):

@@ -12,7 +12,7 @@ from pathlib import Path
 
 from config.errors import InputError
 from config.exports.cell_kinds import parted
-from config.exports.clock_groups import clock_places, value_places
+from config.exports.clock_groups import clock_places, signal_places
 from config.exports.column_names import STATUS, rank_by_name
 from config.exports.header_search import Header, guess_header
 from config.exports.number_notation import decimal_sign, is_numeral
@@ -127,7 +127,7 @@ def columns_of_all(tables: Sequence[RawTable], first: Header) -> list[ColumnPrev
         if header is None:
             continue
         columns = _plain(header)
-        values = value_places(header)
+        values = signal_places(header)
         if table.sheet and len(values) == 1 and len(tables) > 1:
             signal = header.names[values[0]]
             columns = [_renamed(each, table.sheet) if each.name == signal else each for each in columns]

@@ -138,7 +138,8 @@ def _require_a_clock(path: Path, t: Array, rows: Rows, lines: Sequence[int]) -> 
         raise InputError(
             str(path),
             f"lines {first} and {second} are of one time and have different values, "
-            f"{equal.size} of {len(t)} rows are such: export fractions of seconds, one row a time",
+            f"{equal.size} of {len(t)} rows are such: export fractions of seconds, one row a time, or "
+            "leave out time_s and say how far rows lie apart, --period-s S",
         )
     back = np.flatnonzero(steps < 0)
     if back.size > SET_BACK_TOLERATED * len(t):

@@ -14,7 +14,7 @@ from functools import partial
 from itertools import islice, zip_longest
 
 from config.errors import InputError
-from config.exports.cell_kinds import begins_number
+from config.exports.cell_kinds import begins_number, parted
 from config.exports.column_names import COUNTER, STATUS, is_called, rank_by_name
 from config.exports.export_units import unit_named
 from config.exports.header_search import Header, guess_header
@@ -70,10 +70,10 @@ def signals_in(header: Header) -> list[str]:
         for line, cells in islice(header.table.rows(), header.samples_after + LOOKED_AT)
         if line > header.samples_after
     ]
-    if len(_values(header, rows)) != 1:
+    if len(value_places(header, rows)) != 1:
         return []
     for index, name in enumerate(header.names):
-        cells = [cell for cell in _cells(rows, index) if cell != ""]
+        cells = [cell for cell in cells_at(rows, index) if cell != ""]
         held = list(dict.fromkeys(map(str, cells)))
         words = not any(map(begins_number, cells)) and not STATUS.search(name)
         if words and 1 < len(held) <= min(MOST_SIGNALS, len(cells) // 4):
@@ -92,7 +92,7 @@ def table_of_signal(table: RawTable, signal: str) -> RawTable | None:
     rows = list(_rows_of(header, signal))
     if len(rows) < 2:
         return None
-    values = _values(header, [cells for _, cells in rows[:LOOKED_AT]])
+    values = value_places(header, [cells for _, cells in rows[:LOOKED_AT]])
     if len(values) != 1:
         return None
     unit = next((index for index, name in enumerate(header.names) if is_called(UNIT, name)), None)
@@ -119,19 +119,23 @@ def _rows_of(header: Header, signal: str) -> Iterator[tuple[int, list[Cell]]]:
             yield line, cells
 
 
-def _values(header: Header, rows: Sequence[Sequence[Cell]]) -> list[int]:
-    """Return the columns of numbers that may be the values: those called so, else those that change, else all."""
+def value_places(header: Header, rows: Sequence[Sequence[Cell]]) -> list[int]:
+    """Return the columns of numbers that may be signals, neither a clock's, a quality's nor the rows'.
+
+    Of several, the one that is called a value, else those that change.
+    """
     found = []
     for index, name in enumerate(header.names):
-        cells = [cell for cell in _cells(rows, index) if cell != ""]
-        numbers = sum(isinstance(cell, float) or is_numeral(cell) for cell in cells)
+        cells = [cell for cell in cells_at(rows, index) if cell != ""]
+        numbers = sum(isinstance(cell, float) or is_numeral(parted(cell)[0]) for cell in cells)
         other = STATUS.search(name) or COUNTER.search(name) or rank_by_name("time_s", name) is not None
         if cells and 2 * numbers > len(cells) and not other:
             found.append(index)
     called = [index for index in found if is_called(VALUE, header.names[index])]
-    changing = [index for index in found if len(set(_cells(rows, index))) > 1]
+    changing = [index for index in found if len(set(cells_at(rows, index))) > 1]
     return called if len(called) == 1 else changing if len(found) > 1 else found
 
 
-def _cells(rows: Sequence[Sequence[Cell]], index: int) -> list[Cell]:
+def cells_at(rows: Sequence[Sequence[Cell]], index: int) -> list[Cell]:
+    """Return a column of some rows, as far as they go."""
     return [row[index] for row in rows if index < len(row)]
