@@ -35,7 +35,9 @@ from positioner.virtual.virtual_cycle import Script, played, virtual_cycle
 from sim.slave.modbus_slave import device_of
 
 STROKE_M = 0.1016
-DAEMON = DaemonFile.model_validate({"valve": {"stroke_m": STROKE_M}, "cycle": {"pace": "device"}})
+DAEMON = DaemonFile.model_validate(
+    {"valve": {"stroke_m": STROKE_M}, "cycle": {"pace": "device"}, "control": {"law": "seed"}}
+)
 FIRST = Requests(mode=Mode.AUTOMATIC, mode_writes=1, alpha_pa=44e3, beta_pa=13e3)
 TURN_S = 1.0
 TARGET_RATIO, TARGET_US = 0.8, 40.0

@@ -19,7 +19,7 @@ from config.bus_plugins import AnyDevice
 from config.device import Host, ModbusTcpDevice
 from config.errors import InputError
 from config.file_kinds import require_kind
-from config.law_names import one_of_the_laws
+from config.law_names import DEFAULT_LAW, one_of_the_laws
 from config.loading import (
     FolderName,
     Fraction,
@@ -180,7 +180,7 @@ class LawTable(Schema):
 class ControlTable(Schema):
     """Table `[control]`: which law follows the reference, and what it may do."""
 
-    law: Annotated[str, AfterValidator(one_of_the_laws)] = "seed"
+    law: Annotated[str, AfterValidator(one_of_the_laws)] = DEFAULT_LAW
     dead_band: Annotated[float, Field(gt=0, le=0.1)] = 5e-4
     """Error at rest that is left alone, as a fraction of the stroke."""
     cutoff_low: Annotated[float, Field(gt=0, le=0.25)] | None = None

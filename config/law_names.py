@@ -7,6 +7,7 @@ from functools import cache
 from importlib.util import find_spec
 from pathlib import Path
 
+DEFAULT_LAW = "slides"
 REPLACED = {"breakaway": "pulses", "moves": "pulses, and slides where these do not reach"}
 """Laws that there were, and what they moved by."""
 

@@ -9,12 +9,16 @@ if TYPE_CHECKING:
     from positioner.dcs import Dcs
 
 HELP = "identify the valve (moves it: state S3); the mode must be automatic"
-EXAMPLE = "positioner identify --alpha-pa 44126 --beta-pa 13238"
+EXAMPLE = "positioner identify"
 
 
 def add_arguments(parser: argparse.ArgumentParser) -> None:
     """Declare the command line."""
-    parser.add_argument("--alpha-pa", type=float, help="constant part of the excitation, Pa; 0 keeps the stem")
+    parser.add_argument(
+        "--alpha-pa",
+        type=float,
+        help="constant part of a sine ([excitation] kind), Pa; 0 keeps the stem",
+    )
     parser.add_argument("--beta-pa", type=float, help="amplitude of its sine, Pa")
     parser.add_argument("--omega-rad-per-s", type=float, help="angular frequency of its sine, rad/s")
     parser.add_argument("--timeout-s", type=float, default=600.0, help="give up after this many seconds (600)")

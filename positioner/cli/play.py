@@ -7,7 +7,7 @@ from math import nan, sqrt
 from pathlib import Path
 from typing import TYPE_CHECKING
 
-from config.law_names import law_names
+from config.law_names import DEFAULT_LAW, law_names
 
 if TYPE_CHECKING:
     from config.daemon_file import DaemonFile
@@ -32,7 +32,7 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
     """Declare the command line."""
     parser.add_argument("valve", metavar="VALVE.toml", help="a valve file, or the name of a shipped valve")
     parser.add_argument("--reference", type=Path, required=True, metavar="REF.csv", help="time_s, reference_m")
-    parser.add_argument("--law", choices=law_names(), default="seed", help="the control law (seed)")
+    parser.add_argument("--law", choices=law_names(), default=DEFAULT_LAW, help=f"the control law ({DEFAULT_LAW})")
     parser.add_argument(
         "--extended",
         type=Path,

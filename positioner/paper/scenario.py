@@ -205,6 +205,7 @@ def _daemon(period_s: float, stroke_m: float) -> DaemonFile:
     tables = {
         "valve": {"name": "seed", "stroke_m": stroke_m},
         "cycle": {"pace": "device"},
+        "control": {"law": "seed"},
         "identification": {"derivative_window_s": derivative_window_s(period_s)},
     }
     return validated(DaemonFile, tables, "the seed's scenario")

@@ -26,7 +26,9 @@ VALVE = load_valve(shipped_valve("seed")).valve
 STROKE_M = VALVE.stroke_m
 B_OVER_C = -VALVE.spring_n_per_m / VALVE.diaphragm_area_m2
 K_OVER_C = -VALVE.coulomb_n / VALVE.diaphragm_area_m2
-DAEMON = DaemonFile.model_validate({"valve": {"stroke_m": STROKE_M}, "cycle": {"pace": "device"}})
+DAEMON = DaemonFile.model_validate(
+    {"valve": {"stroke_m": STROKE_M}, "cycle": {"pace": "device"}, "control": {"law": "seed"}}
+)
 ALPHA_PA, BETA_PA = 44126.0, 13238.0
 IDENTIFY = (0, 0, 0)
 

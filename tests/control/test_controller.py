@@ -28,7 +28,10 @@ class Bench:
     """A controller, the requests of its DCS and the time; the stem stays where the test puts it."""
 
     def __init__(self, **tables: object) -> None:
-        file = DaemonFile.model_validate({"valve": {"stroke_m": STROKE_M}, "law": LAW, **tables})
+        control = tables.pop("control", {})
+        assert isinstance(control, dict)
+        own = {"control": {"law": "seed", **control}, **tables}
+        file = DaemonFile.model_validate({"valve": {"stroke_m": STROKE_M}, "law": LAW, **own})
         self.controller = Controller(Settings.of(file), HELD_PA)
         self.requests = Requests(beta_pa=BETA_PA)
         self.now_s = 0.0

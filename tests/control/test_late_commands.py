@@ -42,7 +42,9 @@ class Late:
 
 def identified_when_late(periods: int) -> Decision:
     """Return what the cycle has decided when S3 is over: the seed's valve, sine and period, noise of 10 um."""
-    daemon = DaemonFile.model_validate({"valve": {"stroke_m": VALVE.stroke_m}, "cycle": {"pace": "device"}})
+    daemon = DaemonFile.model_validate(
+        {"valve": {"stroke_m": VALVE.stroke_m}, "cycle": {"pace": "device"}, "control": {"law": "seed"}}
+    )
     slave = SlaveFile.model_validate({"clock": {"mode": "lockstep"}, "sensor": {"noise_std_m": 1e-5}})
     valve = Valve.from_file(SEED)
     valve.rest_at(0.0, 0.0)

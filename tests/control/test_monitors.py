@@ -178,7 +178,11 @@ def test_by_default_a_sensor_that_stands_still_is_a_fault_and_a_slow_cycle_an_al
 )
 def test_a_safe_pressure_that_is_none_is_one_line(safety: dict[str, object], said: str) -> None:
     with pytest.raises(InputError, match=said):
-        validated(DaemonFile, {"valve": {"stroke_m": STROKE_M}, "law": LAW, "safety": safety}, "daemon.toml")
+        validated(
+            DaemonFile,
+            {"valve": {"stroke_m": STROKE_M}, "law": LAW, "safety": safety},
+            "daemon.toml",
+        )
 
 
 @pytest.mark.parametrize("name", MONITORS)

@@ -15,7 +15,7 @@ from positioner.daemon.pacing import DevicePace, Pace, RealTimePace
 from positioner.daemon.recorder import Row
 
 DAEMON = DaemonFile.model_validate(
-    {"valve": {"stroke_m": 0.1}, "law": {"b_over_c_pa_per_m": -800e3, "k_over_c_pa": -20e3}}
+    {"valve": {"stroke_m": 0.1}, "law": {"b_over_c_pa_per_m": -800e3, "k_over_c_pa": -20e3}, "control": {"law": "seed"}}
 )
 
 

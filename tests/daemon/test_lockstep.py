@@ -28,7 +28,9 @@ from tests.children import running
 
 STROKE_M = 0.1016
 SLAVE = '[clock]\nmode = "lockstep"\nperiod_s = 1e-3\n[sensor]\nnoise_std_m = 1e-5\nseed = 4\n'
-DAEMON = DaemonFile.model_validate({"valve": {"stroke_m": STROKE_M}, "cycle": {"pace": "device"}})
+DAEMON = DaemonFile.model_validate(
+    {"valve": {"stroke_m": STROKE_M}, "cycle": {"pace": "device"}, "control": {"law": "seed"}}
+)
 EXCITED = Requests(mode=Mode.AUTOMATIC, mode_writes=1, alpha_pa=44e3, beta_pa=13e3)
 
 

@@ -104,7 +104,12 @@ def cycles_until(cycle: Cycle, holds: Callable[[], bool], what: str, most: int =
 
 @pytest.mark.parametrize("bus", ["modbus", "tls", "rtu", "canopen"])
 def test_a_slave_killed_in_s1_is_a_fault_within_3_cycles_and_is_taken_up_again(bus: str, tmp_path: Path) -> None:
-    tables = {"valve": {"stroke_m": STROKE_M}, "law": LAW, "safety": {"stale_after_s": PATIENT_S}}
+    tables = {
+        "valve": {"stroke_m": STROKE_M},
+        "law": LAW,
+        "safety": {"stale_after_s": PATIENT_S},
+        "control": {"law": "seed"},
+    }
     file = DaemonFile.model_validate(tables)
     with wire_of(bus) as wire:
         with slave(tmp_path / "slave.toml", wire.slave(None), *(() if bus == "rtu" else ("--listen-port", "0"))) as (

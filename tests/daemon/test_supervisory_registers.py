@@ -31,7 +31,12 @@ class Panel:
 
     def __init__(self, tables: Mapping[str, object] | None = None) -> None:
         daemon = DaemonFile.model_validate(
-            {"valve": {"stroke_m": STROKE_M}, "law": LAW, "pressure": {"minimum_pa": 0.0, "maximum_pa": 200e3}}
+            {
+                "valve": {"stroke_m": STROKE_M},
+                "law": LAW,
+                "control": {"law": "seed"},
+                "pressure": {"minimum_pa": 0.0, "maximum_pa": 200e3},
+            }
             | dict(tables or {})
         )
         slave = SlaveFile.model_validate({"clock": {"mode": "lockstep"}, "initial": {"position_m": 0.02}})

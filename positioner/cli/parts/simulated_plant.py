@@ -84,12 +84,15 @@ class RunningPair:
     powered_s: float
 
 
+THE_PAPERS_LAW = '[control]\nlaw = "seed"\n'
+
+
 @contextmanager
 def started(bus: str, folder: Path, valve: "ValveParameters") -> Iterator[RunningPair]:
     """Run a slave and a daemon on a bus as processes, their files and logs in a folder."""
     with slave_running(bus, folder, "seed", _ageing(valve)) as (setup, slave):
         powered_s = time.monotonic()
-        with daemon_running(folder / "daemon.toml", setup, slave) as daemon:
+        with daemon_running(folder / "daemon.toml", setup, slave, RECORDER + THE_PAPERS_LAW) as daemon:
             yield RunningPair(slave, daemon, powered_s)
 
 

@@ -39,7 +39,9 @@ class Panel:
         self, law: dict[str, float] | None = None, change: tuple[dict[str, float], ...] = (), **health: float
     ) -> None:
         rest = {"position_m": 0.05, "pressure_pa": 40.7e3}
-        tables = {"valve": {"stroke_m": STROKE_M}, "health": health} | ({"law": law} if law else {})
+        tables = {"valve": {"stroke_m": STROKE_M}, "health": health, "control": {"law": "seed"}} | (
+            {"law": law} if law else {}
+        )
         slave = {"clock": {"mode": "lockstep"}, "initial": rest, "sensor": {"noise_std_m": NOISE_M}, "change": change}
         device = device_of(SlaveFile.model_validate(slave), shipped_valve("seed"))
         self.cycle = virtual_cycle(DaemonFile.model_validate(tables), device, Requests(alpha_pa=70e3, beta_pa=13238.0))
