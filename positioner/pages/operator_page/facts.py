@@ -53,14 +53,10 @@ def waiting(picture: ValvePicture, stroke_m: float, units: Units) -> str:
 
 
 def status(picture: ValvePicture) -> list[Fact]:
-    """Return mode, state, fault, why and the rest in words."""
-    said = [
-        Fact(label, picture.text(name), BY_NAME[name].text)
-        for label, name in (("mode", "mode"), ("state", "state"), ("fault", "fault"), ("doing as asked", "why"))
-    ]
+    """Return in words what is said in no tile: mode, state and fault are."""
     return [
         Fact("service", picture.text("service"), BY_NAME["service"].text),
-        *said,
+        Fact("doing as asked", picture.text("why"), BY_NAME["why"].text),
         Fact("measurement", picture.freshness.measurement or picture.text("quality"), BY_NAME["quality"].text),
         Fact(
             "device",
