@@ -16,7 +16,7 @@ from typing import Annotated, Any, Literal, Self
 from pydantic import AfterValidator, BeforeValidator, Field, IPvAnyNetwork, model_validator
 
 from config.bus_plugins import AnyDevice
-from config.device import Host, ModbusTcpDevice
+from config.device import Host, ModbusDevice, ModbusTcpDevice
 from config.errors import InputError
 from config.file_kinds import require_kind
 from config.law_names import DEFAULT_LAW, one_of_the_laws
@@ -296,6 +296,15 @@ class DaemonFile(Schema):
             raise ValueError(
                 f"device.communication_timeout_s must be more than cycle.period_s ({self.cycle.period_s:g} s), "
                 f"or the device acts by itself between two cycles, it is {alone_s:g} s"
+            )
+        return self
+
+    @model_validator(mode="after")
+    def _device_rests_within_a_cycle(self) -> Self:
+        pause_s = self.device.pause_s if isinstance(self.device, ModbusDevice) else 0.0
+        if self.cycle.pace == "real_time" and pause_s >= self.cycle.period_s:
+            raise ValueError(
+                f"device.pause_s: allowed is less than cycle.period_s ({self.cycle.period_s:g} s), got {pause_s:g}"
             )
         return self
 

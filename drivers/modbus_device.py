@@ -31,6 +31,9 @@ from fieldbus.modbus.pdu import encoded
 OF_A_GATEWAY = (ExcCodes.GATEWAY_PATH_UNAVIABLE, ExcCodes.GATEWAY_NO_RESPONSE)
 """Exceptions that the device did not send: it may be away, or be restarted meanwhile."""
 
+NOT_NOW = (ExcCodes.ACKNOWLEDGE, ExcCodes.DEVICE_BUSY)
+"""Exceptions by which the device says that it is at work on something else."""
+
 READ_COUNTS = (1, 2, 3, 4)
 """Of registers, of reads that make sure that answers are in step with what is asked: none fits another's length."""
 
@@ -58,8 +61,8 @@ class ModbusDriver(ABC):
         # Function 23 reads holding registers only.
         in_one = len(self._reads) == 1 and self._reads[0].table == "holding"
         self._one_transaction = in_one and 23 in config.write_functions
-        self._free_s = -math.inf
-        """When the next request may set out."""
+        self._free_s = 0.0
+        """When the next request may set out; 0: whenever it likes."""
         self._functions_answered: set[int] = set()
         self._has_opened = False
         """Whether the device was ever ready to be driven."""
@@ -243,29 +246,28 @@ class ModbusDriver(ABC):
 
     def _answer(self, request: bytes, head: bytes, length: int) -> bytes:
         """Return the reply as `_transact`, asked for no sooner than the device can take a request."""
-        self._await_pause()
+        if self._free_s > 0.0:
+            self._await_pause()
         try:
             reply = self._transact(request, head, length)
         except Refused:
-            self._note_answer(request)
+            self._note_answer(request[0])
             raise
-        self._note_answer(request)
+        self._note_answer(request[0])
         return reply
 
     def _begin_connection(self) -> None:
         """Let the device come to itself: it was just connected to."""
-        self._free_s = time.monotonic() + self._config.connect_pause_s
+        if self._config.connect_pause_s:
+            self._free_s = time.monotonic() + self._config.connect_pause_s
 
     def _await_pause(self) -> None:
         if (left_s := self._free_s - time.monotonic()) > 0:
             time.sleep(left_s)
 
-    def _note_answer(self, request: bytes) -> None:
-        self._functions_answered.add(request[0])
-        self._rest()
-
-    def _rest(self) -> None:
-        """Let the device rest from now on, if it needs that before the next request."""
+    def _note_answer(self, function: int) -> None:
+        """Note that the device has answered a function, and let it rest, if it needs that before the next request."""
+        self._functions_answered.add(function)
         if self._config.pause_s:
             self._free_s = time.monotonic() + self._config.pause_s
 
@@ -289,7 +291,12 @@ class ModbusDriver(ABC):
     def _refused(self, request: bytes, code: int) -> DriverError:
         """Return what an exception of the device means; by some a gateway says that the device itself was silent."""
         said = f"{self._about(request)}: {exception_text(code)}"
-        return NoReply(said) if code in OF_A_GATEWAY else Refused(said, code)
+        if code in OF_A_GATEWAY:
+            return NoReply(said)
+        refusal = Refused(said, code)
+        if code in NOT_NOW:
+            refusal.kind = "device busy"
+        return refusal
 
     def _about(self, request: bytes) -> str:
         """Say who was asked what."""

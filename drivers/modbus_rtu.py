@@ -62,6 +62,7 @@ class ModbusRtuDriver(ModbusDriver):
             heard = self._await_echo()
             if heard is None:
                 self._echoes_back = True
+                self._note_answer(ECHO[0])
                 return
             if heard or self._echoes_back:
                 raise self._silence(heard)
@@ -94,6 +95,7 @@ class ModbusRtuDriver(ModbusDriver):
             head = bytes((self._unit, function, 2 * count)), bytes((self._unit, function | EXCEPTION))
             if not (frame.startswith(head) and is_whole(frame)):
                 raise self._silence(frame)
+            self._note_answer(function)
 
     def _silence(self, heard: bytes) -> NoConnection:
         said = f" (but {heard.hex(' ')})" if heard else ""
@@ -120,7 +122,6 @@ class ModbusRtuDriver(ModbusDriver):
             reply += data
             if len(reply) > 1 and reply[1] != function:
                 size = EXCEPTION_FRAME
-        self._rest()
         return reply
 
     def _fault(self, request: bytes, frame: bytes) -> DriverError:

@@ -9,6 +9,7 @@ from typing import Any
 
 import pytest
 
+from config.daemon_file import DaemonFile
 from config.device import ModbusTcpDevice
 from drivers import driver_for
 from drivers.boundary import DriverError, NoConnection, NoReply
@@ -132,6 +133,14 @@ def test_a_float_comes_in_any_order_of_words_and_bytes(make: Make, by_words: boo
 def test_a_function_that_the_registers_need_is_not_left_out() -> None:
     with pytest.raises(ValueError, match=r"write_functions: map\.command_pa is written by 16, which is missing"):
         ModbusTcpDevice(write_functions=(23, 6))
+
+
+def test_a_pause_longer_than_the_cycle_is_refused() -> None:
+    tables = {"valve": {"stroke_m": 0.1}, "cycle": {"period_s": 0.02}}
+    with pytest.raises(
+        ValueError, match=r"device\.pause_s: allowed is less than cycle\.period_s \(0\.02 s\), got 0\.05"
+    ):
+        DaemonFile.model_validate({**tables, "device": {"pause_s": 0.05}})
 
 
 def test_a_name_that_nobody_resolves_keeps_the_cycle_no_longer_than_a_reply(

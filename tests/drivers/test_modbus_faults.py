@@ -227,6 +227,9 @@ def test_an_exception_is_a_refusal_or_of_a_gateway_a_lost_reply_and_the_connecti
     scripted.fault = lambda transaction, request, _: frame(transaction, bytes((request[0] | 0x80, code)))
     for act in (lambda: driver.exchange(PUSH_PA), lambda: driver.write(PUSH_PA), driver.read):
         assert f"exception {code}, " in refused_as(kind, act)
+    with pytest.raises(DriverError) as caught:
+        driver.read()
+    assert (caught.value.kind == "device busy") == (code in (5, 6))
     scripted.fault = honest
     before = scripted.device.sample_counter
     assert driver.exchange(PUSH_PA).sample_counter == before + 1

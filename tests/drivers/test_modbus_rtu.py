@@ -583,3 +583,30 @@ def test_an_echo_that_nobody_spoke_of_is_named(scripted: ScriptedDevice) -> None
 def test_a_line_that_does_not_echo_as_said_is_named(scripted: ScriptedDevice) -> None:
     driver = on_two_wires(scripted, local_echo=True)
     assert "serial.local_echo = false" in refused_as(NoConnection, driver.open)
+
+
+def test_a_device_that_needs_time_between_requests_gets_it_on_a_line_too() -> None:
+    """Without it, it never starts; the error names the key."""
+    with pseudo_line() as (end, other_end):
+        device = ScriptedDevice(other_end)
+        answered_s = [-1.0]
+
+        def hasty(_request: bytes, reply: bytes) -> bytes:
+            now_s = time.monotonic()
+            if now_s - answered_s[0] < 0.1:
+                return b""
+            answered_s[0] = now_s
+            return reply
+
+        device.fault = hasty
+        try:
+            rushing = ModbusRtuDriver(ModbusRtuDevice(serial=port(end), reply_timeout_s=0.3))
+            with pytest.raises(NoReply, match=r"one that needs time between requests: device\.pause_s"):
+                rushing.open()
+            time.sleep(0.1)
+            patient = ModbusRtuDriver(ModbusRtuDevice(serial=port(end), reply_timeout_s=0.5, pause_s=0.15))
+            patient.open()
+            assert patient.exchange(PUSH_PA).pressure_pa == pytest.approx(PUSH_PA)
+            patient.close()
+        finally:
+            device.close()
