@@ -22,7 +22,7 @@ from typing import cast
 import numpy as np
 from numba import njit
 
-from benchmarks.drawn_loops import CAUSES, DrawnLoop, Simulate, Truth, draw_loops, simulate
+from benchmarks.drawn_loops import CAUSES, Array, DrawnLoop, Simulate, Truth, draw_loop, draw_loops, simulate
 from workbench.loops import LoopDiagnosis, LoopRecord, diagnose_loop
 from workbench.loops.calibration import calibrate
 from workbench.loops.joint import together
@@ -115,6 +115,24 @@ def of_drawn(found: Sequence[Judged]) -> Iterator[str]:
         yield f"  {cause:20}{len(mine):6}{counts[0]:8}{counts[1]:6}{len(mine) - sum(counts) - gated:6}{gated:14}"
 
 
+def of_a_day() -> str:
+    """Return how long a day at one sample a second takes: a drawn loop there and back, again and again, and noise."""
+    loop = draw_loop(10, "sticks", cast(Simulate, njit(simulate)))
+    rng = np.random.default_rng(0)
+
+    def long(values: Array) -> Array:
+        return np.resize(np.concatenate([values, values[::-1]]), DAY)
+
+    time_s = np.arange(float(DAY))
+    pv = long(loop.pv) + 0.05 * rng.standard_normal(DAY)
+    begin_s = time.process_time()
+    diagnose_loop(LoopRecord.of_samples("day", time_s, long(loop.op_pct), pv, long(loop.sp)))
+    return f"a day at 1 s: {time.process_time() - begin_s:.1f} s of a core"
+
+
+DAY = 86_400
+
+
 def share(part: int, whole: int) -> str:
     return f"{part}/{whole} = {100.0 * part / whole:.0f} %" if whole else "0/0"
 
@@ -205,7 +223,7 @@ def main() -> None:
     scores: list[Score] = []
     if arguments.drawn:
         found = judged(arguments.drawn, 0)
-        print(*of_drawn(found), sep="\n")
+        print(*of_drawn(found), of_a_day(), sep="\n")
         scores += [
             Score("drawn", str(each.truth.seed), int(each.truth.cause == "sticks"), method, each.scores[method])
             for each in found

@@ -57,6 +57,7 @@ def read_loop(
     named: Mapping[str, str] | None = None,
     op_range: tuple[float, float] = (0.0, 100.0),
     time_format: str | None = None,
+    decimal: str | None = None,
 ) -> LoopSamples:
     """Read a loop.
 
@@ -65,6 +66,7 @@ def read_loop(
         named: columns by role, of `ROLES`, that a person names.
         op_range: what the file has for 0 % and 100 % of the output.
         time_format: how dates are written.
+        decimal: the decimal sign; None: as the numbers show.
 
     Raises:
         InputError: the file cannot be read, no loop or several are recognised, or OP is no share; says what to type.
@@ -75,7 +77,7 @@ def read_loop(
     samples = collected(path, header, roles["time"], lambda _what, _done: None)
     cells = {role: samples.cells[theirs] for role, theirs in roles.items()}
     texts = [cell for role in ("op", "pv") for cell in cells[role] if isinstance(cell, str)]
-    decimal = decimal_sign(str(path), texts, header.table.separator)
+    decimal = decimal or decimal_sign(str(path), texts, header.table.separator)
     clock = clock_of(path, samples, roles["time"], None, time_format, decimal)
     values = [numbers_of(cells[role], decimal) for role in ("op", "pv", "sp") if role in roles]
     manual = np.array([MANUAL.match(str(each).strip()) is not None for each in cells.get("mode", [])])

@@ -66,8 +66,9 @@ class LoopRecord(Brief):
         notes = []
         if len(parts) > 1:
             left_out = 1.0 - kept.size / at.size
+            gaps = "a gap" if len(parts) == 2 else f"{len(parts) - 1} gaps"
             notes.append(
-                f"{len(parts) - 1} gaps of more than {LIMITS.gap_periods:g} periods: the longest stretch is taken, "
+                f"{gaps} of more than {LIMITS.gap_periods:g} periods: the longest stretch is taken, "
                 f"{100 * left_out:.0f} % of the samples are left out"
             )
         own_s = time_s[kept]

@@ -64,6 +64,8 @@ def _of_samples(record: LoopRecord, oscillation: Oscillation) -> Iterator[Gate]:
 
 
 def _of_storage(record: LoopRecord) -> Iterator[Gate]:
+    if record.missing > LIMITS.most_missing:
+        return  # what was filled in is straight
     for name, values in (("output", record.op_pct), ("process value", record.pv)):
         if np.ptp(values) == 0.0:
             continue

@@ -27,6 +27,7 @@ def add_loop_arguments(parser: argparse.ArgumentParser) -> None:
         metavar=("AT0", "AT100"),
         help="what the file has for 0 %% and 100 %% of OP (0 100)",
     )
+    columns.add_argument("--decimal", choices=(".", ","), help="the decimal sign (else as the numbers show)")
     columns.add_argument("--time-format", metavar="FORMAT", help='how dates are written, "%%d.%%m.%%Y %%H:%%M:%%S"')
 
 
@@ -44,5 +45,5 @@ def read_record(path: Path, arguments: argparse.Namespace) -> "LoopRecord":
     if low == high:
         raise InputError("--op-range", f"must have a width, got {low:g} twice")
     named = {role: given for role in ROLES if (given := getattr(arguments, role))}
-    read = read_loop(path, named, (low, high), arguments.time_format)
+    read = read_loop(path, named, (low, high), arguments.time_format, arguments.decimal)
     return LoopRecord.of_samples(read.name, read.time_s, read.op_pct, read.pv, read.sp, read.automatic)

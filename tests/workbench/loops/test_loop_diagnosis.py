@@ -67,3 +67,19 @@ def test_reversed_action_and_other_units_change_nothing() -> None:
     found, again = diagnose_loop(record), diagnose_loop(turned)
     assert found.law.action == -again.law.action == 1
     assert found.probability == pytest.approx(again.probability, rel=1e-3)
+
+
+def test_of_two_tags_of_different_rates_only_that_is_said() -> None:
+    loop = draw_loop(10, "sticks")
+    seldom = np.where(np.arange(loop.pv.size) % 4 == 0, loop.op_pct, np.nan)
+    found = diagnose_loop(LoopRecord.of_samples("FIC1", loop.time_s, seldom, loop.pv, loop.sp))
+    assert [each.code for each in found.gates] == ["missing"]
+
+
+def test_of_a_record_with_a_gap_the_longest_stretch_is_taken_and_said() -> None:
+    loop = draw_loop(10, "sticks")
+    kept = np.abs(np.arange(loop.pv.size) - 800) > 25
+    record = LoopRecord.of_samples("FIC1", *(each[kept] for each in (loop.time_s, loop.op_pct, loop.pv, loop.sp)))
+    assert record.pv.size == loop.pv.size - 826
+    assert record.time_s == pytest.approx(826 * loop.truth.period_s)
+    assert "a gap" in record.notes[0]
