@@ -79,7 +79,7 @@ def test_of_two_tags_of_different_rates_only_that_is_said() -> None:
 def test_of_a_record_with_a_gap_the_longest_stretch_is_taken_and_said() -> None:
     loop = draw_loop(10, "sticks")
     kept = np.abs(np.arange(loop.pv.size) - 800) > 25
-    record = LoopRecord.of_samples("FIC1", *(each[kept] for each in (loop.time_s, loop.op_pct, loop.pv, loop.sp)))
+    record = LoopRecord.of_samples("FIC1", loop.time_s[kept], loop.op_pct[kept], loop.pv[kept], loop.sp[kept])
     assert record.pv.size == loop.pv.size - 826
     assert record.time_s == pytest.approx(826 * loop.truth.period_s)
     assert "a gap" in record.notes[0]
