@@ -18,6 +18,7 @@ own. They meet only in immutable snapshots that are replaced whole: the cycle wa
     recorder, logs                recordings and log lines, written beside the cycle
     recording_compression         closed recordings compressed, in a process of its own
     memory, kept_alone            what is known of a valve, kept over restarts; that one daemon keeps it
+    keeping                       one thread that keeps, for all valves
     cycle_statistics, health      how punctual it is; how the valve is (NAMUR NE 107)
     history                       what has happened, written beside the cycle
 """

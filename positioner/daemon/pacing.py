@@ -21,6 +21,10 @@ FIFO_PRIORITY = 40
 MOST_SPIN_S = 200e-6
 SPIN_SHARE = 0.2
 """Of a period at the most: the kernel stalls a FIFO thread that takes 95 % of a core."""
+SWITCH_S, LONGEST_SWITCH_S = 100e-6, 5e-3
+"""How long another thread may keep the interpreter before it is asked to let a cycle run: so long for each thread that
+cycles, at the most. Whoever waits asks so often: of a hundred threads that asked every 100 us the asking took more
+than both processors of a gateway. A cycle of some 200 us that waits for the wire lets go by itself."""
 SILENCE_S = 2e-3
 """A device in lockstep that does not answer is asked again after this."""
 
@@ -144,26 +148,36 @@ class DevicePace:
         return decided_pa
 
 
-def raise_priority() -> bool:
-    """Make the calling thread as punctual as the system permits; return whether it got SCHED_FIFO."""
+def prepare_process(cycle_threads: int) -> None:
+    """Make a process ready for so many threads that cycle, before they begin."""
     gc.collect()
     gc.freeze()
-    # Another thread may keep the interpreter for this long before it is asked to let the cycle run.
-    sys.setswitchinterval(100e-6)
+    sys.setswitchinterval(min(SWITCH_S * cycle_threads, LONGEST_SWITCH_S))
+    libc = ctypes.CDLL(None, use_errno=True)
+    locked = hasattr(libc, "mlockall") and libc.mlockall(MCL_CURRENT | MCL_FUTURE | MCL_ONFAULT) == 0
+    log_event(log, logging.INFO, "cycle threads", threads=cycle_threads, memory_locked=locked)
+
+
+def raise_priority() -> bool:
+    """Make the calling thread as punctual as the system permits; return whether it got SCHED_FIFO."""
     libc = ctypes.CDLL(None, use_errno=True)
     if hasattr(libc, "prctl"):  # Linux
         libc.prctl(PR_SET_TIMERSLACK, 1, 0, 0, 0)
-    locked = hasattr(libc, "mlockall") and libc.mlockall(MCL_CURRENT | MCL_FUTURE | MCL_ONFAULT) == 0
-    fifo = _take_fifo()
-    log_event(log, logging.INFO, "cycle thread", fifo=fifo, memory_locked=locked)
+    fifo = _take_fifo(FIFO_PRIORITY)
+    log_event(log, logging.INFO, "cycle thread", fifo=fifo)
     return fifo
 
 
-def _take_fifo() -> bool:
+def raise_above_cycles() -> None:
+    """Make the calling thread, which ends the daemon, more urgent than any that cycles: it ends when it is told to."""
+    _take_fifo(FIFO_PRIORITY + 1)
+
+
+def _take_fifo(priority: int) -> bool:
     if not hasattr(os, "sched_setscheduler"):  # macOS
         return False
     try:
-        os.sched_setscheduler(0, os.SCHED_FIFO, os.sched_param(FIFO_PRIORITY))
+        os.sched_setscheduler(0, os.SCHED_FIFO | os.SCHED_RESET_ON_FORK, os.sched_param(priority))
     except OSError:
         return False
     return True

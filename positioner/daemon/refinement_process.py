@@ -16,11 +16,12 @@ import math
 import os
 import pickle
 import select
+import signal
 import subprocess
 import sys
 import time
 from contextlib import suppress
-from queue import SimpleQueue
+from queue import Empty, SimpleQueue
 from threading import Event, Thread
 from typing import IO, cast
 
@@ -39,6 +40,8 @@ ANSWER_WITHIN_S = 120.0
 FIRST_S, LONGEST_S = 1.0, 300.0
 """Wait before it is started again: after the first failure, and at the most."""
 MOST_FAILURES = 16
+LOOK_EVERY_S = 1.0
+"""How often it is looked at while there is no job."""
 ENDING_S = 2.0
 """Time the process has to end by itself."""
 
@@ -90,7 +93,7 @@ class RefinementProcess:
     def _serve(self) -> None:
         """Start the process, and hand it one job after another; start it again where it is gone."""
         self._process = self._started()
-        while (task := self._jobs.get()) is not None:
+        while (task := self._next()) is not None:
             refiner, job = task
             result = None
             try:
@@ -100,6 +103,14 @@ class RefinementProcess:
                 self._give_up(str(error) or "it ended")
             refiner.deliver(result)
         self._close()
+
+    def _next(self) -> "tuple[ProcessRefiner, RefinementJob] | None":
+        """Return the next job, None at the end. A process that has ended meanwhile is said, and nothing left of it."""
+        while True:
+            with suppress(Empty):
+                return self._jobs.get(timeout=LOOK_EVERY_S)
+            if self._process is not None and self._process.poll() is not None:
+                self._give_up(f"it ended by itself, {_ended(self._process.returncode)}")
 
     def _done(self, job: RefinementJob) -> BatchResult | None:
         """Have a job done.
@@ -136,6 +147,10 @@ class RefinementProcess:
         except subprocess.TimeoutExpired:
             process.kill()  # a stopped one does not end by being asked
             process.wait()
+
+
+def _ended(status: int) -> str:
+    return f"status {status}" if status >= 0 else signal.strsignal(-status) or f"signal {-status}"
 
 
 class ProcessRefiner:

@@ -6,6 +6,7 @@ or a thread that died): stop serving, leave each valve in its configured safe st
 
 import logging
 from collections.abc import Callable, Sequence
+from concurrent.futures import ThreadPoolExecutor
 from contextlib import ExitStack
 from dataclasses import dataclass
 from functools import partial
@@ -36,13 +37,14 @@ from positioner.daemon.health.ne107 import Ne107Condition
 from positioner.daemon.history import HistoryKeeper, ValveHistory
 from positioner.daemon.history.decision_events import Happened
 from positioner.daemon.history.health_hours import HealthLook
+from positioner.daemon.keeping import Keeping, Kept
 from positioner.daemon.kept_alone import keep_alone
 from positioner.daemon.link import Link, LinkSettings
 from positioner.daemon.local_switch import locks_out
 from positioner.daemon.logs import log_event, logging_valve, start_logging
 from positioner.daemon.memory import MemoryKeeper, StoredMemory
 from positioner.daemon.memory.conditions import conditions_of, pressure_scales
-from positioner.daemon.pacing import DevicePace, Pace, RealTimePace
+from positioner.daemon.pacing import DevicePace, Pace, RealTimePace, prepare_process, raise_above_cycles
 from positioner.daemon.platform_needs import goes_without
 from positioner.daemon.recorder import Recorder
 from positioner.daemon.refinement_process import RefinementProcess
@@ -142,6 +144,9 @@ def serve(files: Sequence[DaemonFile], source: Path, extended: Sequence[Extended
             for keeper in valve.keepers:
                 keeper.start()
                 on_exit.callback(keeper.stop)
+        keeping = Keeping([Kept(keeper, valve.name) for valve in valves for keeper in valve.keepers])
+        keeping.start()
+        on_exit.callback(keeping.stop)
         try:
             said = f"serving {', '.join(valve.name for valve in valves)} on {server.address}"
             print(said, flush=True)
@@ -149,8 +154,7 @@ def serve(files: Sequence[DaemonFile], source: Path, extended: Sequence[Extended
             _run(valves, server, endings, manager)
         finally:
             manager.stopping(endings.reason)
-            for valve in valves:
-                valve.leave()
+            _leave(valves)
         log_event(log, logging.INFO, "stopped", status=endings.status, reason=endings.reason)
     return endings.status
 
@@ -243,14 +247,17 @@ def _run(valves: Sequence[ServedValve], server: RegisterServer, endings: Endings
     Each has a thread of its own, save that valves on one line share that line's.
     """
     stop = Event()
+    lines = _by_line(valves)
+    prepare_process(len(lines))
     threads = [
         Thread(
             target=run_in_turn, args=([valve.cycle for valve in together], stop), name=f"cycle of {together[0].name}"
         )
-        for together in _by_line(valves)
+        for together in lines
     ]
     for thread in threads:
         thread.start()
+    raise_above_cycles()
     try:
         while not endings.came:
             threads[0].join(SIGNAL_CHECK_S)
@@ -260,6 +267,18 @@ def _run(valves: Sequence[ServedValve], server: RegisterServer, endings: Endings
         stop.set()
         for thread in threads:
             thread.join()
+
+
+def _leave(valves: Sequence[ServedValve]) -> None:
+    """Give each device the command of its safe action; lines at the same time, for a silent one takes its time-out."""
+    lines = _by_line(valves)
+    with ThreadPoolExecutor(len(lines)) as at_once:
+        list(at_once.map(_leave_in_turn, lines))
+
+
+def _leave_in_turn(valves: Sequence[ServedValve]) -> None:
+    for valve in valves:
+        valve.leave()
 
 
 def _slowest_s(file: DaemonFile) -> float:

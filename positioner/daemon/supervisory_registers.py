@@ -95,7 +95,7 @@ class SupervisoryRegisters:
         """
         if address + count > SIZE:
             raise RegisterError(ExcCodes.ILLEGAL_ADDRESS)
-        snapshot, requests = self._cycle.snapshot, self._cycle.requests
+        snapshot, requests = _as_of_now(self._cycle), self._cycle.requests
         words = [0] * count
         for register in dict.fromkeys(AT[each] for each in range(address, address + count) if each in AT):
             encoded = self._encoded(register, snapshot, requests)
@@ -227,6 +227,19 @@ class SupervisoryRegisters:
 Getter = Callable[[Snapshot, Requests], float]
 
 
+def _as_of_now(cycle: Cycle) -> Snapshot:
+    """Return what the last cycle left. Where none has come since for too long, what the next will find: a stall."""
+    snapshot = cycle.snapshot
+    if cycle.since_s(snapshot) <= cycle.link.longest_unattended_s:
+        return snapshot
+    fault = snapshot.decision.fault or Fault.STALLED
+    return replace(
+        snapshot,
+        sample=replace(snapshot.sample, quality=Quality.LOST),
+        decision=snapshot.decision._replace(fault=fault),
+    )
+
+
 def _getters(cycle: Cycle, stroke_m: float) -> dict[str, Getter]:
     """Return, by register, what it serves of a snapshot."""
     getters = {
@@ -265,15 +278,10 @@ def _command_getters(stroke_m: float) -> dict[str, Getter]:
 
 
 def _status_getters(cycle: Cycle, stroke_m: float) -> dict[str, Getter]:
-    def quality(snapshot: Snapshot, _: Requests) -> float:
-        # Of a cycle that stands still nothing is good any more.
-        stands = cycle.since_s(snapshot) > cycle.link.longest_unattended_s
-        return Quality.LOST if stands else snapshot.sample.quality
-
     return {
         "state": lambda s, _: s.decision.state,
         "fault": lambda s, _: s.decision.fault,
-        "quality": quality,
+        "quality": lambda s, _: s.sample.quality,
         "why": lambda s, _: s.decision.inhibit_reason,
         "position": lambda s, _: s.sample.position_m / stroke_m,
         "position_scaled": lambda s, _: SCALE * s.sample.position_m / stroke_m,

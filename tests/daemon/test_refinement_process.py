@@ -4,6 +4,7 @@ import os
 import signal
 import time
 from collections.abc import Iterator
+from pathlib import Path
 from types import SimpleNamespace
 
 import numpy as np
@@ -106,6 +107,25 @@ def test_a_process_that_dies_or_does_not_answer_is_told_and_started_again(
     assert process._process is not before
     assert before.poll() is not None, "nothing is left of it"
     process.stop()
+
+
+def test_a_process_that_is_killed_while_idle_is_said_and_none_is_left_of_it(
+    monkeypatch: pytest.MonkeyPatch, caplog: pytest.LogCaptureFixture
+) -> None:
+    monkeypatch.setattr(room, "LOOK_EVERY_S", 0.01)
+    process = RefinementProcess()
+    until = time.monotonic() + 60
+    while process._process is None and time.monotonic() < until:
+        time.sleep(0.005)
+    assert process._process is not None
+    child = process._process
+    os.kill(child.pid, signal.SIGKILL)
+    while process._process is not None and time.monotonic() < until:
+        time.sleep(0.005)
+    assert child.returncode == -signal.SIGKILL, "it was waited for: no zombie"
+    assert not Path(f"/proc/{child.pid}").exists()
+    process.stop()
+    assert caplog.messages == ["the refinement process is gone"]
 
 
 def test_it_is_started_ever_more_seldom(monkeypatch: pytest.MonkeyPatch) -> None:

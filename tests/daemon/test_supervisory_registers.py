@@ -7,7 +7,7 @@ from collections.abc import Mapping, Sequence
 import pytest
 from pymodbus.constants import ExcCodes
 
-from config.codes import Fault, InhibitReason, Mode, Quality
+from config.codes import Fault, InhibitReason, Mode, Ne107Status, Quality
 from config.daemon_file import DaemonFile
 from config.registers import BY_NAME, FLOAT_TEST, LONG_TEST, SIZE, WORD_TEST
 from config.slave_file import SlaveFile
@@ -249,10 +249,11 @@ def test_the_age_is_worked_out_when_it_is_read_and_what_is_old_is_not_good(
     """Of a cycle that stands still."""
     panel.run()
     monkeypatch.setattr(panel.cycle.link, "_longest_unattended_s", 1.0)
-    for stands_s, quality in ((0.5, Quality.GOOD), (2.5, Quality.LOST)):
+    for stands_s, quality, fault in ((0.5, Quality.GOOD, Fault.NONE), (2.5, Quality.LOST, Fault.STALLED)):
         monkeypatch.setattr(panel.cycle._pace, "since_s", lambda _now_s, stands_s=stands_s: stands_s)
         assert panel.get("sample_age") == pytest.approx(stands_s)
-        assert panel.get("quality") == quality
+        assert (panel.get("quality"), panel.get("fault")) == (quality, fault)
+        assert (panel.get("ne107") == Ne107Status.FAILURE) == (fault is Fault.STALLED)
 
 
 class Registers:

@@ -7,7 +7,6 @@ another now, it is none.
 """
 
 import json
-import math
 from collections.abc import Mapping
 from dataclasses import asdict, dataclass, fields, replace
 from pathlib import Path
@@ -15,6 +14,15 @@ from pathlib import Path
 from config.whole_file import replace_whole
 
 VERSION = 1
+WHOLE = frozenset({"reversals", "moves_judged"})
+ALLOWED: Mapping[str, tuple[float, float]] = {
+    "travel_m": (0.0, 1e9),
+    "reversals": (0, 2**32 - 1),
+    "stiction_index": (0.0, 1.0),
+    "moves_judged": (0, 2**32 - 1),
+    "baseline_pa": (1e-3, 1e12),
+}
+"""Of each count, and of the friction in the drive's own unit: no valve comes so far, and a register can hold it."""
 SCALES = "scales"
 Scales = Mapping[str, str]
 """Of the device's pressures: keys of the configuration and their values."""
@@ -95,7 +103,7 @@ def _parsed(text: bytes, valve: str) -> tuple[HealthRecord, Scales]:
             raise _Unreadable(f"{key}: allowed is {allowed!r}, got {content[key]!r}")
     for name in names:
         if problem := _problem(name, content[name]):
-            raise _Unreadable(f"{name}: {problem}, got {content[name]!r}")
+            raise _Unreadable(f"{name}: {problem}, got {content[name]!r:.40}")
     scales = content.get(SCALES, {})  # kept since the second form of the file only
     if not isinstance(scales, dict) or not all(isinstance(each, str) for each in scales.values()):
         raise _Unreadable(f"{SCALES}: must be a table of texts, got {scales!r}")
@@ -103,20 +111,12 @@ def _parsed(text: bytes, valve: str) -> tuple[HealthRecord, Scales]:
 
 
 def _problem(name: str, value: object) -> str | None:
-    if name in ("reversals", "moves_judged"):
-        whole = isinstance(value, int) and not isinstance(value, bool) and value >= 0
-        return None if whole else "must be a whole number from 0 up"
-    if name == "baseline_pa":
-        return None if value is None or _from(value, 0.0, above=True) else "must be a number above 0, or null"
-    within = _from(value, 0.0) and (name != "stiction_index" or float(value) <= 1.0)  # type: ignore[arg-type]
-    return None if within else "must be a number from 0 up" + (" to 1" if name == "stiction_index" else "")
-
-
-def _from(value: object, least: float, *, above: bool = False) -> bool:
-    if not isinstance(value, int | float) or isinstance(value, bool):
-        return False
-    try:
-        number = float(value)
-    except OverflowError:  # a whole number of more digits than any
-        return False
-    return math.isfinite(number) and (number > least if above else number >= least)
+    least, most = ALLOWED[name]
+    if value is None and name == "baseline_pa":
+        return None
+    kinds = int if name in WHOLE else int | float
+    if isinstance(value, kinds) and not isinstance(value, bool) and least <= value <= most:
+        return None
+    return f"must be {'a whole' if name in WHOLE else 'a'} number from {least:g} to {most:g}" + (
+        ", or null" if name == "baseline_pa" else ""
+    )

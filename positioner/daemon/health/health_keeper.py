@@ -8,7 +8,6 @@ import logging
 from collections.abc import Callable
 from dataclasses import dataclass
 from pathlib import Path
-from threading import Event, Thread
 from urllib.parse import quote
 
 from config.codes import Ne107Status
@@ -21,8 +20,8 @@ from positioner.daemon.logs import log_event, logging_valve
 
 log = logging.getLogger(__name__)
 
-CHECK_EVERY_S = 1.0
 WRITE_EVERY_CHECKS = 60
+"""Of a second each (`positioner.daemon.keeping`)."""
 
 
 def health_path(folder: Path, valve: str) -> Path:
@@ -56,7 +55,7 @@ class StoredHealth:
 
 
 class HealthKeeper:
-    """A thread from `start` to `stop`. Without a file it only says when the status changes."""
+    """Looked at from `start` to `stop`. Without a file it only says when the status changes."""
 
     def __init__(
         self,
@@ -75,20 +74,17 @@ class HealthKeeper:
         self._logged = Ne107Condition(())
         self._failed = False
         self._checks = 0
-        self._stopping = Event()
-        self._thread = Thread(target=self._work, name=f"health of {valve}", daemon=True)
 
     def start(self) -> None:
-        """Begin to look; say first if what was kept cannot be read, or its baseline is of other scales."""
+        """Say if what was kept cannot be read, or its baseline is of other scales."""
         if self._file is not None:
             with logging_valve(self._valve):
                 _say_of(self._file)
-        self._thread.start()
 
     def stop(self) -> None:
-        """Keep the counts and end."""
-        self._stopping.set()
-        self._thread.join()
+        """Keep the counts."""
+        with logging_valve(self._valve):
+            self.store(self._health.record)
 
     def check(self) -> None:
         """Check once: log a new status, and write the counts when it is time."""
@@ -119,12 +115,6 @@ class HealthKeeper:
             self._failed = True
             return
         self._written, self._failed = record, False
-
-    def _work(self) -> None:
-        with logging_valve(self._valve):
-            while not self._stopping.wait(CHECK_EVERY_S):
-                self.check()
-            self.store(self._health.record)
 
 
 def _say_of(stored: StoredHealth) -> None:

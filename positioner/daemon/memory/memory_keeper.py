@@ -9,7 +9,6 @@ import logging
 from collections.abc import Callable
 from dataclasses import dataclass
 from pathlib import Path
-from threading import Event, Thread
 from urllib.parse import quote
 
 from config.codes import Restored
@@ -22,8 +21,8 @@ from positioner.daemon.memory.memory_file import Kept, read_memory, set_aside, w
 
 log = logging.getLogger(__name__)
 
-CHECK_EVERY_S = 1.0
 WRITE_EVERY_CHECKS = 60
+"""Of a second each (`positioner.daemon.keeping`)."""
 
 
 def memory_path(folder: Path, valve: str) -> Path:
@@ -55,7 +54,7 @@ class StoredMemory:
 
 
 class MemoryKeeper:
-    """A thread from `start` to `stop`.
+    """Looked at from `start` to `stop`.
 
     Args:
         stored: the file.
@@ -79,23 +78,21 @@ class MemoryKeeper:
         self._identifications = 0
         self._written: ValveKnowledge | None = None
         self._checks, self._failed = 0, False
-        self._stopping = Event()
-        self._thread = Thread(target=self._work, name=f"memory of {valve}", daemon=True)
 
     def start(self) -> None:
-        """Begin to look; say first what was restored, or why it was not."""
+        """Say what was restored, or why it was not."""
         kept, file = self._stored.kept, str(self._stored.path)
         with logging_valve(self._valve):
             if kept.problem is not None:
                 log_event(log, logging.WARNING, "memory set aside", file=file, reason=kept.problem)
             elif kept.knowledge is not None:
                 log_event(log, logging.INFO, "memory restored, provisional", file=file, written=kept.written)
-        self._thread.start()
 
     def stop(self) -> None:
-        """Keep what is known and end."""
-        self._stopping.set()
-        self._thread.join()
+        """Keep what is known."""
+        with logging_valve(self._valve):
+            self.check()
+            self.store()
 
     def check(self) -> None:
         """Check once: set aside what was contradicted, write when it is time."""
@@ -137,10 +134,3 @@ class MemoryKeeper:
             fields = {"file": str(self._stored.path), "reason": error.strerror}
             log_event(log, logging.ERROR, "memory cannot be written", **fields)
         self._failed = True
-
-    def _work(self) -> None:
-        with logging_valve(self._valve):
-            while not self._stopping.wait(CHECK_EVERY_S):
-                self.check()
-            self.check()
-            self.store()

@@ -1,0 +1,56 @@
+"""One thread that keeps, for all valves: of each its health and what is known of it, looked at once a second in turn.
+
+A thread each would be two a valve that ask for the interpreter beside its cycle. They are looked at one after another,
+evenly over the second: so none waits for all the others, and no cycle for more than one.
+"""
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+from itertools import cycle
+from threading import Event, Thread
+from typing import Protocol
+
+from positioner.daemon.logs import logging_valve
+
+EVERY_S = 1.0
+
+
+class Keeper(Protocol):
+    """What is looked at."""
+
+    def check(self) -> None:
+        """Look once."""
+        ...
+
+
+@dataclass(frozen=True, slots=True)
+class Kept:
+    """A keeper, and its valve by its name in the log."""
+
+    keeper: Keeper
+    valve: str
+
+
+class Keeping:
+    """A thread from `start` to `stop`; its death ends the daemon, as that of any."""
+
+    def __init__(self, kept: Sequence[Kept]) -> None:
+        self._kept = tuple(kept)
+        self._stopping = Event()
+        self._thread = Thread(target=self._work, name="keeping", daemon=True)
+
+    def start(self) -> None:
+        """Begin to look."""
+        self._thread.start()
+
+    def stop(self) -> None:
+        """End; what is under way is finished."""
+        self._stopping.set()
+        self._thread.join()
+
+    def _work(self) -> None:
+        for each in cycle(self._kept):
+            if self._stopping.wait(EVERY_S / len(self._kept)):
+                return
+            with logging_valve(each.valve):
+                each.keeper.check()
