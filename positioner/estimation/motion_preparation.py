@@ -9,11 +9,14 @@ and v_0 are free.
 
 from dataclasses import dataclass, replace
 from math import inf, nextafter
+from typing import Literal
 
 import numpy as np
 
 from positioner.estimation.array import Array
 from positioner.estimation.motion_segment import MotionSegment
+
+Beside = Literal["preload", "drift"]
 
 MOST_ROWS = 8000
 """A longer motion is averaged in blocks. A block of length T_b shifts μ by T_b^2/24: with 8000 of them nothing."""
@@ -38,7 +41,7 @@ class PreparedMotion:
         free_velocity: whether position and velocity at the start are unknown.
         held: how the pressure goes between the rows.
         start_interval: where the start is unknown; None: `time_s[0]`.
-        lopsided: whether a force that has one direction, as a preload has, may act beside friction.
+        beside: what may act beside the model: a preload, that is a force of one direction, or a drift of the sensor.
     """
 
     direction: int
@@ -51,7 +54,7 @@ class PreparedMotion:
     free_velocity: bool
     held: bool
     start_interval: "StartInterval | None" = None
-    lopsided: bool = False
+    beside: Beside | None = None
 
 
 @dataclass(frozen=True, slots=True)
@@ -74,7 +77,7 @@ class StartInterval:
         return replace(motion, time_s=time_s)
 
 
-def prepared(segment: MotionSegment, *, held: bool, lopsided: bool = False) -> PreparedMotion:
+def prepared(segment: MotionSegment, *, held: bool, beside: Beside | None = None) -> PreparedMotion:
     """Return the rows of a motion, from the jump of a held pressure that began it, or from where it surely moves."""
     jump = _initial_jump(segment, held)
     from_rest = jump is not None
@@ -106,7 +109,7 @@ def prepared(segment: MotionSegment, *, held: bool, lopsided: bool = False) -> P
         rest_count=count,
         free_velocity=not from_rest,
         held=held,
-        lopsided=lopsided,
+        beside=beside,
     )
 
 
