@@ -1,8 +1,9 @@
 """`python -m benchmarks`: every benchmark that takes seconds; `benchmarks.endurance` takes an hour and runs alone."""
 
-from benchmarks import bus, can, cycle_time, estimation, modbus_pieces, physics, rtu_cycle, startup, tls_cycle
+from benchmarks import bus, can, cycle_time, estimation, modbus_pieces, physics, rtu_cycle, speed, startup, tls_cycle
 
 for name, benchmark in {
+    "speed against the stored runs": speed.report,
     "physics": physics.report,
     "estimation": estimation.report,
     "bus": bus.report,
