@@ -23,6 +23,8 @@ port = {port}
 folder = "recordings"
 [history]
 folder = "history"
+[control]
+law = "seed"
 [law]
 b_over_c_pa_per_m = -814542.6
 k_over_c_pa = -22068.2
