@@ -1,7 +1,8 @@
 """What one cycle leaves for the others: replaced whole, never changed."""
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
+from config.codes import Fault, Quality
 from positioner.control.controller_memory import Decision
 from positioner.control.sample import Sample
 from positioner.history.entries import Event
@@ -15,3 +16,9 @@ class Snapshot:
     decision: Decision
     event: Event | None = None
     """The newest of the valve's history, if it has one."""
+
+    def stalled(self) -> "Snapshot":
+        """Return what is true where no cycle has come since for too long: what the next will find, a stall."""
+        decision = self.decision
+        found = decision._replace(fault=decision.fault or Fault.STALLED)
+        return replace(self, sample=replace(self.sample, quality=Quality.LOST), decision=found)

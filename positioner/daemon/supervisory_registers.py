@@ -20,7 +20,7 @@ from importlib.metadata import version
 
 from pymodbus.constants import ExcCodes
 
-from config.codes import Fault, Mode, Quality, ServiceState
+from config.codes import Fault, Mode, ServiceState
 from config.registers import (
     BY_NAME,
     ESTIMATED,
@@ -230,14 +230,8 @@ Getter = Callable[[Snapshot, Requests], float]
 def _as_of_now(cycle: Cycle) -> Snapshot:
     """Return what the last cycle left. Where none has come since for too long, what the next will find: a stall."""
     snapshot = cycle.snapshot
-    if cycle.since_s(snapshot) <= cycle.link.longest_unattended_s:
-        return snapshot
-    fault = snapshot.decision.fault or Fault.STALLED
-    return replace(
-        snapshot,
-        sample=replace(snapshot.sample, quality=Quality.LOST),
-        decision=snapshot.decision._replace(fault=fault),
-    )
+    stands_still = cycle.since_s(snapshot) > cycle.link.longest_unattended_s
+    return snapshot.stalled() if stands_still else snapshot
 
 
 def _getters(cycle: Cycle, stroke_m: float) -> dict[str, Getter]:

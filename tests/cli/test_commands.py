@@ -345,12 +345,12 @@ def test_simulate_holds_each_pressure_until_the_next_time(tmp_path: Path) -> Non
 
 def test_play_identifies_and_then_follows(tmp_path: Path, capsys: Capture) -> None:
     reference = tmp_path / "reference.csv"
-    reference.write_text("time_s,reference_m\n0,0.05\n0.6,0.035\n1.2,0.07\n1.8,0.07\n")
+    reference.write_text("time_s,reference_m\n0,0.05\n3,0.035\n6,0.07\n9,0.07\n")
     words = ["play", "seed", "--reference", str(reference), "--noise-m", "1e-5", "-o", str(tmp_path / "run.csv")]
     assert main(words) == 0
     assert "identified b/c = -81" in capsys.readouterr().out
     recording = read_recording(tmp_path / "run.csv")
-    for end_s, wanted_m in ((0.59, 0.05), (1.19, 0.035), (1.79, 0.07)):
+    for end_s, wanted_m in ((2.9, 0.05), (5.9, 0.035), (8.9, 0.07)):
         at = int(np.searchsorted(recording.time_s, end_s))
         assert recording.columns["reference_m"][at] == wanted_m
         assert recording.position_m[at] == pytest.approx(wanted_m, abs=2e-4)

@@ -46,7 +46,8 @@ def test_slips_missed_and_spurious_are_counted_and_none_is_not_said(missed: int,
 
 
 def test_a_stem_at_rest_that_the_model_moves_is_said() -> None:
-    still = replace(FOUND, measured_slips=(), events=SlipEvents((), (), (1.0,)))
+    at_rest_m = np.full(100, 0.01)
+    still = replace(FOUND, position_m=at_rest_m, measured_slips=(), events=SlipEvents((), (), (1.0,)))
     assert "the model makes 1 spurious slip:" in sentences(still)[0]
 
 
