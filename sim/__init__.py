@@ -4,6 +4,7 @@ Its files:
 
     karnopp, first_order_lag             the equations, and how a step is taken
     misfit                               how far a response is from measured positions, and what that costs
+    told                                 the equations of a stem that is told when it moves
     quasi_static                         the same without inertia, for samples farther apart than a slide lasts
     effect, effects                      how an effect is written; those that come along
     own_effect                           the example of one of a person's own, and whether a search may try it

@@ -17,7 +17,7 @@ from config.loading import validated
 from config.valve_file import ValveFile, ValveParameters
 from sim.effect import SHIPPED, Effect, find_effect
 from sim.karnopp import MEMORY, Vector
-from sim.kernel import EitherKernel, Kernel, QuasiStaticKernel, kernel, quasi_static_kernel
+from sim.kernel import EitherKernel, Kernel, QuasiStaticKernel, ToldKernel, kernel, quasi_static_kernel, told_kernel
 
 BASE = (
     "mass_kg",
@@ -82,6 +82,11 @@ class Composition:
     def quasi_static(self) -> QuasiStaticKernel:
         """The kernel without inertia; compiled when it is first asked for."""
         return self._kernel("quasi-static", quasi_static_kernel)
+
+    @property
+    def told(self) -> ToldKernel:
+        """The kernel of a stem that is told when it moves; compiled when it is first asked for."""
+        return self._kernel("told", told_kernel)
 
     @property
     def state_size(self) -> int:

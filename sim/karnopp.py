@@ -102,6 +102,8 @@ class Karnopp(NamedTuple):
     F_s: float
     v_s: float
     dz: float
+    told: float
+    """1 of a stem that is told when it moves (`sim.told`), else 0: static friction has no part in that then."""
 
 
 class Stem(NamedTuple):
@@ -135,7 +137,13 @@ class Condition(NamedTuple):
 
 def karnopp(theta: Vector) -> Karnopp:
     """Read the base model from the parameter vector: m, A, k_s, F_v, F_c, F_s, v_s, deadzone_ratio first."""
-    return Karnopp(1.0 / theta[0], theta[1], theta[2], theta[3], theta[4], theta[5], theta[6], theta[7] * theta[6])
+    return Karnopp(1.0 / theta[0], theta[1], theta[2], theta[3], theta[4], theta[5], theta[6], theta[7] * theta[6], 0.0)
+
+
+def levels(valve: Karnopp, direction: float, stem: Stem, q: Any, z: Any) -> tuple[float, float]:
+    """Return F_c and F_s, N, with all effects, in a direction of (impending) motion; F_c twice where it is told."""
+    F_c, F_s = friction(valve.F_c, valve.F_s, direction, stem, q, z)
+    return F_c, F_c if valve.told > 0.0 else F_s
 
 
 def stem_at(drive: Drive, tau: float, x: float, v: float) -> Stem:
@@ -152,14 +160,14 @@ def excess(valve: Karnopp, stem: Stem, q: Any, z: Any) -> float:
     """|F_e| - F_s, N, but for BREAKAWAY_FACTOR: positive when the stuck stem breaks away."""
     F_e = external_force(valve, stem, q, z)
     direction = 1.0 if F_e > 0.0 else -1.0
-    _, F_s = friction(valve.F_c, valve.F_s, direction, stem, q, z)
+    _, F_s = levels(valve, direction, stem, q, z)
     return direction * F_e - BREAKAWAY_FACTOR * F_s
 
 
 def acceleration(valve: Karnopp, mode: int, sigma: float, stem: Stem, q: Any, z: Any) -> float:
     """v', m/s^2, by the law of the mode."""
     F_e = external_force(valve, stem, q, z)
-    F_c, F_s = friction(valve.F_c, valve.F_s, sigma, stem, q, z)
+    F_c, F_s = levels(valve, sigma, stem, q, z)
     if mode == BREAKING:
         return (F_e - F_s * sigma) * valve.per_m
     w = stem.v / valve.v_s
@@ -174,7 +182,7 @@ def margin(valve: Karnopp, mode: int, sigma: float, stem: Stem, q: Any, z: Any) 
     if mode == SLIP:
         return sigma * stem.v - valve.dz
     F_e = external_force(valve, stem, q, z)
-    _, F_s = friction(valve.F_c, valve.F_s, sigma, stem, q, z)
+    _, F_s = levels(valve, sigma, stem, q, z)
     return min(valve.dz - sigma * stem.v, sigma * F_e - F_s)
 
 
@@ -409,12 +417,13 @@ def step(
     mode: int,
     sigma: float,
     tolerance: float,
+    held: bool,
     q: Any,
     z: Any,
 ) -> tuple[float, float, int, float]:
-    """Carry the stem over one step; return x, v, mode, sigma at its end."""
+    """Carry the stem over one step; return x, v, mode, sigma at its end. Where it is held it stays once it is stuck."""
     tau = 0.0
-    while tau < h:
+    while tau < h and not (held and mode == STUCK):
         if mode == STUCK:
             tau, mode, sigma = wait(valve, drive, tau, h, x, sigma, q, z)
             continue
@@ -504,7 +513,7 @@ def carry(
             x0 = x
             _, s = straight(command, left, Stem(t0, x, v, p), q, z)
             p0, p = pressure(command, command, s, Stem(t0, x, v, p), q, z)
-            x, v, mode, sigma = step(valve, Drive(t0, p0, (p - p0) / s), s, x, v, mode, sigma, tolerance, q, z)
+            x, v, mode, sigma = step(valve, Drive(t0, p0, (p - p0) / s), s, x, v, mode, sigma, tolerance, False, q, z)
             x, v = settle(valve, Stem(t0 + s, x, v, p), q, z)
             if v == 0.0:
                 mode = STUCK

@@ -26,7 +26,7 @@ from pathlib import Path
 from typing import Any
 
 from config.lock_file import lock_descriptor
-from sim import karnopp, kernel_linker, machine_code, misfit, quasi_static
+from sim import karnopp, kernel_linker, machine_code, misfit, quasi_static, told
 from sim.effect import Effect
 from sim.karnopp import MEMORY, Vector
 from sim.kernel_source import SHARED, Filling, effect_source, fillings
@@ -35,6 +35,7 @@ from sim.machine_code import MATRIX, NUMBER, VECTOR, Entry, is_bitcode, loaded, 
 BASE = Path(karnopp.__file__)
 MISFIT = Path(misfit.__file__)
 SLOW = Path(quasi_static.__file__)
+TOLD = Path(told.__file__)
 COMPILER = Path(__file__).with_name("kernel_compiler.py")
 WRITABLE_BY_OTHERS = 0o022
 KARNOPP_IMPORT = re.compile(r"^from sim\.karnopp import \([^)]*\)\n", re.MULTILINE)
@@ -58,6 +59,12 @@ ENTRIES: Mapping[str, tuple[int, ...]] = {
 SLOW_ENTRIES: Mapping[str, tuple[int, ...]] = {
     **EITHER,
     "glide": (VECTOR, VECTOR, VECTOR, VECTOR, VECTOR, NUMBER, MATRIX),
+}
+
+
+TOLD_ENTRIES: Mapping[str, tuple[int, ...]] = {
+    "rest": EITHER["rest"],
+    "tell": (VECTOR, VECTOR, VECTOR, VECTOR, VECTOR, VECTOR, NUMBER, NUMBER, NUMBER, MATRIX, MATRIX),
 }
 
 
@@ -88,6 +95,23 @@ class QuasiStaticKernel(EitherKernel):
     """The same and `glide` of `quasi_static.py`."""
 
     glide: Entry[Vector, Vector, Vector, Vector, Vector, float, Vector]
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class ToldKernel:
+    """`tell` of `told.py`, with the effects in their places."""
+
+    tell: Entry[Vector, Vector, Vector, Vector, Vector, Vector, float, float, float, Vector, Vector]
+
+
+def told_kernel(effects: Sequence[Effect]) -> ToldKernel:
+    """Return the kernel of a stem that is told when it moves.
+
+    Raises:
+        InputError: as `kernel`.
+    """
+    _, _, compiled = _of(effects, (BASE, TOLD), TOLD_ENTRIES)
+    return ToldKernel(tell=compiled["tell"])
 
 
 def kernel(effects: Sequence[Effect]) -> Kernel:

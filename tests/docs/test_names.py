@@ -18,7 +18,19 @@ from positioner.cli.main import COMMANDS, command_parser
 
 ROOT = Path(__file__).parents[2]
 DOCUMENTS = [ROOT / "README.md", *sorted((ROOT / "docs").rglob("*.md"))]
-ROOMS = ("benchmarks", "config", "deploy", "docs", "drivers", "fieldbus", "positioner", "sim", "tests", "workbench")
+ROOMS = (
+    "benchmarks",
+    "config",
+    "signals",
+    "deploy",
+    "docs",
+    "drivers",
+    "fieldbus",
+    "positioner",
+    "sim",
+    "tests",
+    "workbench",
+)
 FILES = {path.name for room in ROOMS for path in (ROOT / room).rglob("*.*")} | {path.name for path in ROOT.glob("*.*")}
 OF_THE_READER = {"acme_device.py", "acme_driver.py", "tight_spot.py"}
 """Files that a document tells its reader to write."""

@@ -138,7 +138,7 @@ def test_a_force_that_damps_the_stem_takes_as_few_sub_steps_as_viscous_friction(
         return -150e3 * stem.v
 
     valve = karnopp.karnopp(Composition.from_file(changed(viscous_ns_per_m=2e3)).theta)
-    begin = (0.05, 0.02, karnopp.SLIP, 1.0, 1e-5, None, None)
+    begin = (0.05, 0.02, karnopp.SLIP, 1.0, 1e-5, False, None, None)
     drive = karnopp.Drive(0.0, 90e3, 0.0)
     x, v, *_ = karnopp.step(valve._replace(F_v=152e3), drive, 0.01, *begin)
     monkeypatch.setattr(karnopp, "force", damping)

@@ -76,8 +76,6 @@ def errors_of(error_m: float = FLOOR_M, *, scatter: float = 0.0, structure: floa
         all_logs=logs,
         structure=structure,
         independent_share=1.0,
-        knife_edges=(),
-        test_rest_rmse_m=error_m,
     )
 
 

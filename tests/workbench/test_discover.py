@@ -26,7 +26,7 @@ from workbench.discover.curve import curve_of, has_curve
 from workbench.discover.discovery import discover
 from workbench.discover.form_file import form_text, write_forms
 from workbench.discover.grammar import FORMS, Form
-from workbench.select.knife_edges import KnifeEdge
+from workbench.select.block_errors import Told
 
 SPRING = Path(__file__).parents[2] / "benchmarks" / "outside" / "second_spring.py"
 BARE = drawn_valve(np.random.default_rng(11))
@@ -201,10 +201,9 @@ def test_where_nothing_is_left_no_form_is_sought(folder: Path) -> None:
     found = discover(record_of(BARE, 7, 1000), KNOWN, test=record_of(BARE, 8, 1000))
     assert (found.outcome, found.found) == ("explained", ())
     assert "nothing is left to explain" in found.sentence
-    edge = KnifeEdge(6.7, 7.68, "static_n", -0.001)
-    errors = replace(found.base.errors, knife_edges=(edge,), test_rmse_m=2e-4, test_rest_rmse_m=5e-5)
-    excepting = replace(found, base=replace(found.base, errors=errors))
-    assert excepting.sentence.endswith(f"Excepted on what was held out: {edge.sentence}; without, 0.05 mm rms.")
+    errors = replace(found.base.errors, test_rmse_m=2e-4, told=Told(5e-5, 5e-5))
+    told = replace(found, base=replace(found.base, errors=errors))
+    assert told.sentence.endswith("told when the stem moves, the valve leaves 0.05 mm rms.")
 
 
 @pytest.mark.parametrize("name", ["found.txt", "my-form.py", "a.b.py"])

@@ -16,6 +16,7 @@ from workbench.data.record import ready
 from workbench.diagnosis.verdict_sentence import reduction_sentence
 from workbench.select.block_errors import (
     BlockErrors,
+    Told,
     block_logs,
     independent_share,
     indistinguishable,
@@ -72,7 +73,7 @@ def test_a_slip_met_by_luck_is_no_gain() -> None:
 
 
 @pytest.mark.parametrize(
-    ("train_rmse", "test_rest_rmse", "train_block", "test_block", "there"),
+    ("train_rmse", "told_rmse", "train_block", "test_block", "there"),
     [
         (1.0, 1.0, 1.0, 1.0, True),
         (2.0, 1.0, 1.0, 1.0, False),
@@ -82,17 +83,17 @@ def test_a_slip_met_by_luck_is_no_gain() -> None:
     ],
 )
 def test_the_floor_is_missed_by_many_blocks_or_by_far_in_a_few(
-    train_rmse: float, test_rest_rmse: float, train_block: float, test_block: float, there: bool
+    train_rmse: float, told_rmse: float, train_block: float, test_block: float, there: bool
 ) -> None:
     none = np.zeros(0)
     rmse = (train_rmse, 20.0, train_block, test_block)
-    errors = BlockErrors(*rmse, none, none, 0.0, 1.0, (), test_rest_rmse)
+    errors = BlockErrors(*rmse, none, none, 0.0, 1.0, told=Told(told_rmse, test_block))
     assert errors.at_floor(1.0) is there
     assert not errors.at_floor(None), "where the floor is unknown nobody can say"
 
 
 def errors_of(logs: np.ndarray) -> BlockErrors:
-    return BlockErrors(1e-4, 1e-4, 1e-4, 1e-4, logs[30:], logs, 0.0, 1.0, (), 1e-4)
+    return BlockErrors(1e-4, 1e-4, 1e-4, 1e-4, logs[30:], logs, 0.0, 1.0)
 
 
 def test_two_are_indistinguishable_that_differ_by_a_narrowly_mistimed_slip_and_not_if_one_is_worse_throughout() -> None:

@@ -40,7 +40,7 @@ def test_of_those_accepted_the_one_with_most_evidence_is_added_and_all_stand_by_
 
 def test_of_those_that_the_fitted_part_does_not_tell_the_one_that_explains_what_was_held_out_is_added() -> None:
     missed = model_of("preload", cost=0.999 * AT_FLOOR)
-    missed = replace(missed, errors=replace(missed.errors, test_rest_rmse_m=50.0 * FLOOR_M))
+    missed = replace(missed, errors=replace(missed.errors, test_rmse_m=50.0 * FLOOR_M))
     step = judged(POOR, preload=missed, asymmetric_friction=model_of("asymmetric_friction"))
     assert step.candidates[0].name == "preload", "by a hair"
     assert step.added

@@ -12,7 +12,7 @@ from workbench.diagnosis.as_given import AsGiven
 from workbench.diagnosis.judged_landings import unknown_between_samples
 from workbench.diagnosis.verdict import EXPLAINED, Verdict, by_another_name
 from workbench.fit.fit_result import Fit
-from workbench.select.block_errors import NOISE_KNOWN_TO, BlockErrors, knife_edges_sentence
+from workbench.select.block_errors import NOISE_KNOWN_TO, BlockErrors, told_sentence
 from workbench.select.effect_acceptance import LEAST_INDEPENDENT
 from workbench.select.effect_candidates import EffectCandidate, EffectStep, EvaluatedModel
 from workbench.select.equivalence import classes, distinguishing_record
@@ -65,16 +65,16 @@ def _said(
         return f"{begun} {off}{apart}"
     suspicion = _suspicion(steps[-1].suspected)
     if verdict == "adequate":
-        said = _adequate(best.errors, parts, length, given) + knife_edges_sentence(best.errors, length)
+        said = _adequate(best.errors, parts, length, given) + told_sentence(best.errors, length)
         return said + suspicion + _scatter(parts, length)
     if verdict == "missing":
         said = f"Missing: {names}; {fell}, and {_left(best.errors, parts, steps[-1].suspected)}."
-        return said + by_pressure + knife_edges_sentence(best.errors, length) + suspicion
+        return said + by_pressure + told_sentence(best.errors, length) + suspicion
     if verdict == "one_of":
         all_known = _floors_left(best.errors, parts) <= NOISE_KNOWN_TO
         left = "" if all_known else f", and {_left(best.errors, parts, steps[-1].suspected)}"
         said = f"Missing: {names}{or_another}; {fell}{left}.{apart}{by_pressure}"
-        return said + knife_edges_sentence(best.errors, length) + suspicion
+        return said + told_sentence(best.errors, length) + suspicion
     several = sum(step.added is not None for step in steps) > 1
     lowers, explains = ("lower", "explain") if several else ("lowers", "explains")
     part = f"{lowers} it" if verdict in ("unjudged", "unfinished") else f"{explains} a part"
@@ -131,7 +131,7 @@ def _kept_off(equivalent: EffectCandidate | None, best: EvaluatedModel) -> str:
     return (
         f"a parameter that was kept is off: with {equivalent.name}, the bare valve by another name, {fell}. "
         "Put the mass_kg that plate, stem and plug weigh into the valve file, and diagnose again."
-        f"{knife_edges_sentence(equivalent.model.errors, best.fit.kind.length)}"
+        f"{told_sentence(equivalent.model.errors, best.fit.kind.length)}"
     )
 
 

@@ -25,7 +25,7 @@ from workbench.discover.added_force import Landing, landings
 from workbench.discover.form_search import searched_forms
 from workbench.discover.found_form import FoundForm
 from workbench.fit.fitted_parameter import parameter_table
-from workbench.select.block_errors import knife_edges_sentence
+from workbench.select.block_errors import told_sentence
 from workbench.select.candidate_table import candidate_columns, candidate_table, lengths
 from workbench.select.effect_candidates import EffectCandidate, EvaluatedModel
 from workbench.select.effect_search import EffectSearch, Progress
@@ -58,7 +58,7 @@ class Discovery(Result):
         match self.outcome:
             case "explained":
                 said = "nothing is left to explain: the valve as it is, refitted, is at the floor; no form is sought"
-                excepted = knife_edges_sentence(self.base.errors, length)
+                excepted = told_sentence(self.base.errors, length)
                 return f"{said}.{excepted}" if excepted else said
             case "unjudged" if self.split.early:
                 return f"{self.split.early.sentence}. {SAME_CLOCK}"

@@ -8,6 +8,8 @@ Its files:
     starts, guesses    where searches begin; what the positions suggest
     setpoint_starts    the same for a valve behind its positioner
     shooting           searches by multiple shooting, where those of the free run leave something to explain
+    likelihood         of a record that is told when its stem moves: where slides lead to, and what breaks it loose
+    onsets             when each move begins, as suits a valve best
     landings           the balance of forces where slides end in rest, from which searches begin too
     objective          what they lower
     descent            how: trust region, and a scan of the stairs

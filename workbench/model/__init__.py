@@ -3,6 +3,7 @@
 Its files:
 
     free_run                  simulates it whole, on the command alone
+    told_run                  simulates it told when the stem moves, by the record's own moves
     slow_segments             a record as it is simulated without inertia
     initial_state             where a segment begins, and the pressure that nobody told
     lead                      what was commanded before a segment, for a pressure path that remembers

@@ -7,7 +7,7 @@ Its files:
     effect_acceptance, block_errors               the rule by which an effect is accepted; its statistics
     pressure_errors                               how far a fit's pressure is off the measured one
     pressure_scatter                              what the noise of a measured pressure moves a stem by: of the floor
-    knife_edges                                   held-out slips that are narrowly mistimed, by name
+    told_errors                                   what is held out, told when the stem moves: static friction apart
     equivalence                                   what no recording tells apart
     tangent_preview                               the quick first ranking
     experiment                                    the input that tells rivals apart, off a menu

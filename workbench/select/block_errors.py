@@ -9,7 +9,7 @@
 Static friction is only known to an interval, so that on held-out data a slip is narrowly mistimed now and then, and the
 blocks up to the next slip have an error a hundred times the noise, whatever the model. Therefore no block counts for
 more than a factor of 2 where two models are compared. Whether one explains all is another question: there the plain
-rms of what was held out must be at the floor too, each such slip excepted by name (`knife_edges`).
+rms of what was held out must be at the floor too, or what it is told when the stem moves (`told_errors`).
 """
 
 from dataclasses import dataclass, replace
@@ -23,9 +23,9 @@ from config.results.result import Brief
 from workbench.data.held_out import HELD_OUT_RECORDING, Part, Split, residual_m
 from workbench.fit.fit_result import Fit
 from workbench.model.sampling import NO_LANDING
-from workbench.select.knife_edges import KnifeEdge, error_without, knife_edges, rms
 from workbench.select.residual_structure import clipped, structure
 from workbench.select.rest_errors import RestErrors, rest_errors
+from workbench.select.told_errors import told_error_m
 
 BLOCK_S, BLOCK_SAMPLES = 1.0, 10
 AT_FLOOR, RARELY_OFF = 1.6, 1.75
@@ -47,8 +47,14 @@ NEGLIGIBLE = 0.1
 """Of the floor: what an error below it is does not matter."""
 SAME_STANDARD_ERRORS, SAME_REDUCTION = 2.0, 0.02
 """Within one of these two models are indistinguishable."""
-MOST_NAMED = 3
-"""Excepted slips that a sentence names: a week's are dozens, and one rule excepts them all."""
+
+
+@dataclass(frozen=True, slots=True)
+class Told:
+    """What a model leaves of what was held out, told when the stem moves (`told_errors`): rms, and a typical second."""
+
+    rmse_m: float
+    block_m: float
 
 
 @dataclass(frozen=True, slots=True, repr=False)
@@ -66,17 +72,28 @@ class BlockErrors(Brief):
     all_logs: Column
     """l_b of the fitted and the held-out blocks, (blocks,)."""
     structure: float
-    """How much of the residual, without knife edges, hangs on the state, fitted or held out, whichever is more."""
+    """How much of the residual that is judged hangs on the state, fitted or held out, whichever is more."""
     independent_share: float
     """Share of the fitted samples that are independent."""
-    knife_edges: tuple[KnifeEdge, ...]
-    """Held-out slips that are narrowly mistimed, where these decide whether all is explained, or anything is left."""
-    test_rest_rmse_m: float
-    """The rms error held out without these."""
     rests: RestErrors | None = None
     """How far rests are off, where all else is at the floor and yet something may be left, or `with_rests`."""
+    told: "Told | None" = None
+    """What was held out leaves told when the stem moves, where a free run leaves more: a slip that it mistimes."""
     mistimed_m: float = 0.0
     """What the noise of a measured pressure adds to the rms besides a typical second (`pressure_scatter`)."""
+
+    @property
+    def _held_out_rmse_m(self) -> float:
+        return self.told.rmse_m if self.told else self.test_rmse_m
+
+    @property
+    def _held_out_block_m(self) -> float:
+        return self.told.block_m if self.told else self.test_block_m
+
+    def fitted_at_floor(self, floor_m: float) -> bool:
+        """Whether no model could do better on what was fitted."""
+        near = self.train_rmse_m <= RARELY_OFF * self.rms_floor_m(floor_m)
+        return near and self.train_block_m <= AT_FLOOR * floor_m
 
     def at_floor(self, floor_m: float | None) -> bool:
         """Whether no model could do better: in the mean of what was fitted, and in most blocks of what was not.
@@ -86,12 +103,12 @@ class BlockErrors(Brief):
         """
         if floor_m is None:
             return False
-        mostly = max(self.train_block_m, self.test_block_m) <= AT_FLOOR * floor_m
+        mostly = max(self.train_block_m, self._held_out_block_m) <= AT_FLOOR * floor_m
         return mostly and self.rms_floors(floor_m) <= RARELY_OFF
 
     def rms_floors(self, floor_m: float) -> float:
         """Return the rms, fitted or held out, whichever is more, over what it is at the floor."""
-        return max(self.train_rmse_m, self.test_rest_rmse_m) / self.rms_floor_m(floor_m)
+        return max(self.train_rmse_m, self._held_out_rmse_m) / self.rms_floor_m(floor_m)
 
     def rms_floor_m(self, floor_m: float) -> float:
         """Return what the rms is at the floor, m: behind a measured pressure its noise mistimes a few slips."""
@@ -99,17 +116,17 @@ class BlockErrors(Brief):
 
     def floors_left(self, floor_m: float) -> float:
         """Return what is left, in floors: a typical second's error or the rms, fitted or held out, the most of them."""
-        return max(max(self.train_block_m, self.test_block_m) / floor_m, self.rms_floors(floor_m))
+        return max(max(self.train_block_m, self._held_out_block_m) / floor_m, self.rms_floors(floor_m))
 
     def leaves_nothing(self, floor_m: float | None) -> bool:
         """Whether what is left of a record that is explained is the floor, so that another effect has no room in it."""
         if floor_m is None or self.train_rmse_m > NOTHING_LEFT * self.rms_floor_m(floor_m):
             return False
-        return max(self.train_block_m, self.test_block_m) <= NOTHING_LEFT * floor_m
+        return max(self.train_block_m, self._held_out_block_m) <= NOTHING_LEFT * floor_m
 
     def follows(self, motion_std_m: float) -> bool:
         """Whether a typical second's error is small against the motion, given by its standard deviation, m."""
-        return max(self.train_block_m, self.test_block_m) <= MOST_LEFT * motion_std_m
+        return max(self.train_block_m, self._held_out_block_m) <= MOST_LEFT * motion_std_m
 
 
 def block_errors(fit: Fit, split: Split) -> BlockErrors:
@@ -138,23 +155,23 @@ def block_errors(fit: Fit, split: Split) -> BlockErrors:
         all_logs=np.concatenate([fitted_logs, logs]),
         structure=max(fitted_structure, structure(test.record, held_out_m, negligible_m)),
         independent_share=independent_share(fitted_m),
-        knife_edges=(),
-        test_rest_rmse_m=test_rmse_m,
         mistimed_m=split.by_pressure.mistimed_m if split.by_pressure and fit.from_pressure else 0.0,
     )
     floor_m = split.floor_m
-    if floor_m is None or not replace(found, test_rest_rmse_m=0.0).at_floor(floor_m):
+    if floor_m is None or not found.fitted_at_floor(floor_m):
         return found
-    if found.floors_left(floor_m) > NOTHING_LEFT:
+    if found.at_floor(floor_m) and found.floors_left(floor_m) > NOTHING_LEFT:
         found = replace(found, rests=rest_errors(split, fitted_m, held_out_m))
     if test_rmse_m <= NOISE_KNOWN_TO * found.rms_floor_m(floor_m):
         return found
-    edges = knife_edges(fit.valve, train, test, held_out_m, floor_m, from_pressure=fit.from_pressure)
-    if not edges:
+    told_m = told_error_m(fit, split)
+    if told_m is None or _rms(told_m) >= test_rmse_m:
         return found
-    rest_m = error_without(test.record.time_s, held_out_m, edges)
-    left = max(fitted_structure, structure(test.record, rest_m, negligible_m))
-    return replace(found, knife_edges=edges, test_rest_rmse_m=rms(rest_m), structure=left)
+    told_logs = block_logs(test.record.time_s, told_m, negligible_m, block_s(test))
+    left = max(fitted_structure, structure(test.record, told_m, negligible_m))
+    told = Told(_rms(told_m), float(np.exp(np.median(told_logs))))
+    logs = np.concatenate([fitted_logs, told_logs])
+    return replace(found, told=told, logs=told_logs, all_logs=logs, structure=left)
 
 
 def with_rests(errors: BlockErrors, fit: Fit, split: Split) -> BlockErrors:
@@ -209,11 +226,15 @@ def independent_share(error_m: Column) -> float:
     return (1.0 - rho) / (1.0 + rho)
 
 
-def knife_edges_sentence(errors: BlockErrors, length: Scale) -> str:
-    """Name the held-out slips that were excepted, with a leading space; empty if none was."""
-    if not errors.knife_edges:
+def told_sentence(errors: BlockErrors, length: Scale) -> str:
+    """Say what is left told when the stem moves, with a leading space; empty where the free run is judged."""
+    if errors.told is None:
         return ""
-    named = "; ".join(each.sentence for each in errors.knife_edges[:MOST_NAMED])
-    left = len(errors.knife_edges) - MOST_NAMED
-    more = f"; and {left} more" if left > 0 else ""
-    return f" Excepted on what was held out: {named}{more}; without, {length.said(errors.test_rest_rmse_m)} rms."
+    return (
+        f" Static friction is known to an interval, in which a free run mistimes a held-out slip; told when the stem "
+        f"moves, the valve leaves {length.said(errors.told.rmse_m)} rms."
+    )
+
+
+def _rms(error_m: Column) -> float:
+    return float(np.sqrt(np.nanmean(error_m**2)))

@@ -1,0 +1,160 @@
+"""Rests and moves of a sampled position: the events of a valve that sticks.
+
+    D_w(i) = mean(x_i+1 .. x_i+w) - mean(x_i-w+1 .. x_i)     it moves from i to i + 1 where |D_w| > c sigma sqrt(2/w)
+
+for w = 1, 2, 4, ... samples, the narrow windows first: a window that holds a motion seen already tells no other. What
+lies between two motions is a rest. A move begins after the last sample that lies at the rest before it, and ends with
+the first that lies at the rest after it.
+
+A rest must show: between two moves the slope a of the samples must be less than half that of the whole, by 3
+deviations,
+
+    |a| + 3 sigma sqrt(12 / L^3) < |x_e - x_b| / (2 (e - b))     L samples of it; b, e where the moves begin and end
+
+else both are one: a stem that slides slowly, seen through noise, is no stem that sticks and slips. What goes on in the
+same direction, by less than `TAIL` noises and more slowly than the whole, is the end of the move before: a stem that
+breaks loose is fast.
+
+x position, m; sigma standard deviation of its noise, m; c = `SEEN`.
+"""
+
+from collections.abc import Callable
+from dataclasses import dataclass
+from itertools import pairwise
+
+import numpy as np
+import numpy.typing as npt
+
+Array = npt.NDArray[np.float64]
+Mask = npt.NDArray[np.bool_]
+Run = tuple[int, int]
+"""Samples at rest last before a motion and first after it."""
+
+SEEN = 5.0
+"""Standard deviations of D_w beyond which it is no noise: of 12 000 samples in 7 widths one in 20 records has one."""
+WIDTHS = (1, 2, 4, 8, 16, 32, 64)
+"""Samples of a window: a stem that creeps by a noise in 60 samples is still seen to move."""
+AT_REST = 2.5
+"""Standard deviations of the noise within which a sample lies at a rest."""
+FEWEST = 3
+"""Samples of a rest between two moves: of fewer no slope tells that the stem stood still."""
+COVERED = 6.0
+"""Standard deviations of the noise that a move covers: what creeps by less is a rest, of a sensor that settles."""
+TAIL = 20.0
+"""Standard deviations of the noise: farther than what is left of a slide behind a lag when it no longer shows."""
+SURELY, SLOWER = 3.0, 0.5
+"""Deviations of the slope of a rest, and the share of the mean slope about it, below which it is one."""
+
+
+@dataclass(frozen=True, slots=True)
+class Move:
+    """Rows: at rest last before it, and first after it; -1, or the number of rows, where the record ends in it."""
+
+    before: int
+    after: int
+
+
+def moving(position_m: Array, noise_m: float) -> Mask:
+    """Return whether the stem moves from each sample to the next, (n - 1,).
+
+    Args:
+        position_m: m, (n,), all finite.
+        noise_m: standard deviation of the noise, m.
+    """
+    n = position_m.size
+    moves = np.zeros(n - 1, dtype=np.bool_)
+    total = np.concatenate([[0.0], np.cumsum(position_m - position_m[0])])
+    for w in WIDTHS:
+        if 2 * w > n:
+            break
+        mean = (total[w:] - total[:-w]) / w
+        across = np.abs(mean[w:] - mean[:-w])
+        seen_before = np.concatenate([[0], np.cumsum(moves)])
+        # The window of `across[j]` holds the steps j .. j + 2 w - 2; its middle one is j + w - 1.
+        clear = seen_before[2 * w - 1 :] == seen_before[: n - 2 * w + 1]
+        found = clear & (across > SEEN * noise_m * np.sqrt(2.0 / w))
+        middle = np.flatnonzero(found) + w - 1
+        for reach in range(-(w // 2), w // 2 + 1):
+            moves[middle + reach] = True
+    return moves
+
+
+def moves(position_m: Array, noise_m: float) -> tuple[Move, ...]:
+    """Return the moves of an unbroken stretch of positions, m, (n,), in their order; those between which no rest shows
+    are one.
+
+    A sample that is not a number is as the one before it.
+    """
+    x = _filled(position_m)
+    steps = moving(x, noise_m)
+    edges = np.flatnonzero(np.diff(np.concatenate([[False], steps, [False]])))
+    runs = [(int(first), int(end)) for first, end in zip(edges[::2], edges[1::2], strict=True)]
+    # Steps first .. end - 1 move: samples `first` and `end` are the last and the next at rest.
+    apart = _joined(runs, lambda one, other: not _rests_between(x, noise_m, one, other))
+    apart = _joined(apart, lambda one, other: _is_tail(x, noise_m, one, other))
+    return tuple(_fitted(x, noise_m, apart))
+
+
+def _joined(runs: list[Run], belong: Callable[[Run, Run], bool]) -> list[Run]:
+    """Join neighbours that belong together, from the first on."""
+    joined: list[Run] = []
+    for run in runs:
+        joined.append(run)
+        while len(joined) > 1 and belong(*joined[-2:]):
+            joined[-2:] = [(joined[-2][0], joined[-1][1])]
+    return joined
+
+
+def _is_tail(x: Array, noise_m: float, one: Run, other: Run) -> bool:
+    """Return whether the second of two moves is but the end of the first."""
+    went, goes = float(x[one[1]] - x[one[0]]), float(x[other[1]] - x[other[0]])
+    whole = abs(float(x[other[1]] - x[one[0]])) / (other[1] - one[0])
+    slow = abs(goes) / (other[1] - other[0]) < whole
+    return went * goes > 0.0 and abs(goes) < TAIL * noise_m and slow
+
+
+def _rests_between(x: Array, noise_m: float, one: Run, other: Run) -> bool:
+    """Return whether the samples between two moves show a rest."""
+    first, last = one[1], other[0]
+    count = last - first + 1
+    if count < FEWEST:
+        return False
+    rows = np.arange(count) - 0.5 * (count - 1)
+    square = float(rows @ rows)
+    slope = float(rows @ x[first : last + 1]) / square
+    mean = abs(float(x[other[1]] - x[one[0]])) / (other[1] - one[0])
+    went, goes = float(x[one[1]] - x[one[0]]), float(x[other[1]] - x[other[0]])
+    if went * goes < 0.0:  # it turned round: what it did between is seen against the faster of both
+        mean = max(abs(float(x[b] - x[a])) / (b - a) for a, b in (one, other))
+    return bool(abs(slope) + SURELY * noise_m / np.sqrt(square) < SLOWER * mean)
+
+
+def _filled(position_m: Array) -> Array:
+    known = np.isfinite(position_m)
+    rows = np.maximum.accumulate(np.where(known, np.arange(position_m.size), 0))
+    filled = position_m[rows]
+    filled[~np.isfinite(filled)] = position_m[known][0]
+    return filled
+
+
+def _fitted(x: Array, noise_m: float, runs: list[Run]) -> list[Move]:
+    """Move each end of a run to where the rest beside it ends."""
+    bounds = [0, *[row for run in runs for row in run], x.size - 1]
+    rests = [(bounds[i], bounds[i + 1]) for i in range(0, len(bounds), 2)]
+    within = AT_REST * noise_m
+    found = []
+    for (before, after), (first, end) in zip(pairwise(rests), runs, strict=True):
+        row, last = first, end
+        level = float(np.median(x[before[0] : before[1] + 1]))
+        while row > before[0] and abs(x[row] - level) > within:
+            row -= 1
+        while row + 1 < end and abs(x[row + 1] - level) <= within:
+            row += 1
+        level = float(np.median(x[after[0] : after[1] + 1]))
+        while last < after[1] and abs(x[last] - level) > within:
+            last += 1
+        while last - 1 > row and abs(x[last - 1] - level) <= within:
+            last -= 1
+        if abs(x[last] - x[row]) > COVERED * noise_m:
+            found.append(Move(-1 if first == 0 else row, x.size if end == x.size - 1 else last))
+    return found

@@ -1,0 +1,207 @@
+"""The valve whose stem is told when it moves: the record has seen it, and sliding friction alone says where to.
+
+    held    v = 0 whatever the forces                                 until the onset of a move
+    loose   m v' = F_e - F_v v - F_c sigma, from rest if |F_e| > F_c  to the last sample that the record shows in motion
+            once it has been faster than `FAST` v_s by the law of `sim.karnopp`, with Stribeck's term, until it sticks
+    after it the stem slides until it stops, and is held again
+
+x stem position, m; v velocity, m/s; F_e external force, F_c sliding friction, N, with all effects as in `sim.karnopp`.
+Static friction has no part in when it moves. What it would have to be is told beside it: with F_s' = g F_s + d what the
+effects make of static friction F_s at a place and time,
+
+    L = (|F_e| - d) / g                          static friction, N, that just bears the load of a stem at rest
+
+It was at least L at every sample of a rest, and at most L where the stem broke loose. A stem at rest may be anywhere
+within `blur` of where it is held, m: L is the least there, lest a stop, which gives way by micrometres, be a load.
+
+What acts on the stem's measured position, a positioner, is fed that: the loop is cut, and a pressure without feedback
+is smooth in every parameter.
+
+The file runs as it stands: the bare valve. `sim.kernel` compiles its text after that of `sim.karnopp`.
+"""
+
+from math import ceil
+from typing import Any, NamedTuple
+
+from sim.karnopp import (
+    STUCK,
+    Condition,
+    Drive,
+    Karnopp,
+    Stem,
+    Vector,
+    excess,
+    external_force,
+    friction,
+    karnopp,
+    pressure,
+    read,
+    remember,
+    sensor,
+    settle,
+    step,
+    straight,
+    unknown,
+    write,
+)
+
+SHARE = 0.01
+"""Of F_s, for the difference that gives g."""
+FOREVER_S = 1e9
+FAST = 6.0
+"""Of v_s: Stribeck's term is gone there, so that static friction makes no difference to a stem that has got there."""
+LOOSE_S = 2e-3
+"""Longest step of a stem that may slide, s: within a stem's own times it is fast, and has stopped again."""
+HELD_N = 1e-9
+"""L of a stem that is held and bears nothing: other than 0, which says that it is not."""
+
+
+class Told(NamedTuple):
+    """A stem told when it moves, L, N, the largest while it was at rest, and 1 if it has been fast since then."""
+
+    now: Condition
+    load: float
+    fast: float
+
+
+def told_valve(theta: Vector) -> Karnopp:
+    """Return the constants of a stem that is told when it moves."""
+    free = karnopp(theta)
+    return Karnopp(free.per_m, free.A, free.k_s, free.F_v, free.F_c, free.F_s, free.v_s, free.dz, 1.0)
+
+
+def ordinary(told: Karnopp) -> Karnopp:
+    """Return the constants of the same stem that is told nothing."""
+    return Karnopp(told.per_m, told.A, told.k_s, told.F_v, told.F_c, told.F_s, told.v_s, told.dz, 0.0)
+
+
+def load(valve: Karnopp, stem: Stem, blur: float, q: Any, z: Any) -> float:
+    """L, N."""
+    F_e = external_force(valve, stem, q, z)
+    farther = external_force(valve, Stem(stem.t, stem.x + (blur if F_e > 0.0 else -blur), 0.0, stem.p), q, z)
+    nearer = external_force(valve, Stem(stem.t, stem.x - (blur if F_e > 0.0 else -blur), 0.0, stem.p), q, z)
+    if F_e * farther <= 0.0 or F_e * nearer <= 0.0:
+        return 0.0
+    least = min(abs(F_e), abs(farther), abs(nearer))
+    F_e = least if F_e > 0.0 else -least
+    direction = 1.0 if F_e > 0.0 else -1.0
+    more = SHARE * valve.F_s
+    _, F_s = friction(valve.F_c, valve.F_s, direction, stem, q, z)
+    _, F_m = friction(valve.F_c, valve.F_s + more, direction, stem, q, z)
+    g = (F_m - F_s) / more
+    return valve.F_s + (direction * F_e - F_s) / g if g > 0.0 else valve.F_s
+
+
+def carried(
+    valve: Karnopp,
+    now: Condition,
+    command: float,
+    duration: float,
+    longest_step: float,
+    tolerance: float,
+    held: bool,
+    fast: float,
+    seen: float,
+    seen_rate: float,
+    blur: float,
+    q: Any,
+    z: Any,
+) -> Told:
+    """Carry the valve over a duration (s) with the command (Pa) held; L is the largest in it of a stem at rest.
+
+    A pressure path that obeys the stem is fed `seen`, m, and its rate, m/s; NaN: the simulated stem.
+    """
+    t, x, v, p, mode, sigma, indicated = now
+    fed = seen == seen  # noqa: PLR0124 -- NaN is unlike itself
+    rests = held and mode == STUCK
+    longest = FOREVER_S if rests and not fed else longest_step if rests else min(longest_step, LOOSE_S)
+    free = ordinary(valve)
+    n = 1 if duration <= longest else ceil(duration / longest - 1e-6)
+    h = duration / n
+    most = 0.0
+    for i in range(n):
+        t0, left = t + i * h, h
+        while left > 0.0:
+            x0 = x
+            there = seen + seen_rate * (t0 - t) if fed else x
+            _, s = straight(command, left, Stem(t0, there, v, p), q, z)
+            p0, p = pressure(command, command, s, Stem(t0, there, v, p), q, z)
+            if mode == STUCK:
+                most = max(most, load(valve, Stem(t0, x, 0.0, p0), blur, q, z))
+            law = free if fast > 0.0 else valve
+            x, v, mode, sigma = step(law, Drive(t0, p0, (p - p0) / s), s, x, v, mode, sigma, tolerance, held, q, z)
+            x, v = settle(valve, Stem(t0 + s, x, v, p), q, z)
+            if v == 0.0:
+                mode = STUCK
+            if mode == STUCK:
+                fast = 0.0
+            elif abs(v) > FAST * valve.v_s:
+                fast = 1.0
+            t0 += s
+            left -= s
+            stem = Stem(t0, x, v, p)
+            if mode == STUCK and held:
+                most = max(most, load(valve, stem, blur, q, z))
+            remember(x0, s, stem, q, z)
+            _, indicated = sensor(x0, x, s, stem, q, z)
+    off = unknown(sigma + excess(valve, Stem(t + duration, x, v, p), q, z))
+    return Told(Condition(t + duration, x + off, v, p, mode, sigma, indicated + off), most, fast)
+
+
+def tell(
+    theta: Vector,
+    state: Vector,
+    commands: Vector,
+    periods: Vector,
+    held: Vector,
+    seen: Vector,
+    longest_step: float,
+    tolerance: float,
+    blur: float,
+    path: Vector,
+    loads: Vector,
+) -> None:
+    """Hold each command for its period in turn, the stem for a share of it; write t, p, x, v, indicated as `respond`.
+
+    Seen is what a pressure path that obeys the stem is fed, m, (periods + 1,); NaN: the simulated stem.
+    Shares, (periods,), from 0, loose throughout, to 1, held throughout. Loads, (2, periods): L, N, of the stem held in
+    a period, and where it was let go in it; 0 where it was not.
+    """
+    valve, now, fast = told_valve(theta), read(state), 0.0
+    for i in range(len(commands) + 1):
+        if i > 0:
+            k, share, before = i - 1, held[i - 1], now.mode
+            loads[0, k], loads[1, k] = 0.0, 0.0
+            command, rests_s, slides_s = commands[k], share * periods[k], (1.0 - share) * periods[k]
+            rate = (seen[i] - seen[k]) / periods[k]
+            if rests_s > 0.0:
+                here = carried(
+                    valve, now, command, rests_s, longest_step, tolerance, True, fast, seen[k], rate, blur, theta, state
+                )
+                now, loads[0, k], fast = here.now, max(here.load, HELD_N), here.fast
+            if slides_s > 0.0:
+                still = now.mode == STUCK and (before == STUCK or rests_s > 0.0)
+                here = carried(
+                    valve,
+                    now,
+                    command,
+                    slides_s,
+                    longest_step,
+                    tolerance,
+                    False,
+                    fast,
+                    seen[k] + rate * rests_s,
+                    rate,
+                    blur,
+                    theta,
+                    state,
+                )
+                now, fast = here.now, here.fast
+                if still:
+                    loads[1, k] = max(here.load, loads[0, k], HELD_N)
+        path[0, i] = now.t
+        path[1, i] = now.p
+        path[2, i] = now.x
+        path[3, i] = now.v
+        path[4, i] = now.indicated
+    write(state, now)

@@ -1,0 +1,96 @@
+"""The likelihood of a record that is told when its stem moves: no stairs, and static friction in an interval."""
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+
+from config.recording import Column, Recording
+from config.valve_file import ValveFile
+from sim.composition import COULOMB, STATIC, Composition
+from tests.workbench.valves import NOISE_M, SEED, record_of, with_effect
+from workbench.data.record import Record, ready
+from workbench.fit.likelihood import Likelihood, soft
+from workbench.fit.onsets import with_onsets
+from workbench.model.free_run import FreeRun
+from workbench.model.sampling import DYNAMIC
+from workbench.model.told_run import ToldRun, told_moves
+
+LAG = with_effect(SEED, "ip_lag", time_constant_s=0.15)
+
+
+def steps() -> Column:
+    """Return a command of few moves, Pa: steps and ramps, and rests between them."""
+    places = [(0.0, 0.2, 1), (2.0, 0.2, 1), (2.01, 0.6, 1), (5.0, 0.6, 1), (8.0, 0.3, -1), (10.0, 0.3, -1)]
+    places += [(13.0, 0.75, 1), (15.0, 0.75, 1), (15.01, 0.25, -1), (18.0, 0.25, -1), (20.0, 0.5, 1), (22.0, 0.5, 1)]
+    valve = SEED.valve
+    at_s, share, way = np.array(places).T
+    balance_pa = (valve.spring_n_per_m * valve.stroke_m * share + way * valve.coulomb_n) / valve.diaphragm_area_m2
+    command_pa: Column = np.interp(np.arange(0.0, 22.0, 0.01), at_s, balance_pa)
+    return command_pa
+
+
+def recording(file: ValveFile, seed: int = 3) -> Recording:
+    return record_of(file, seed, command_pa=steps())
+
+
+def likelihood(file: ValveFile, record: Record) -> Likelihood:
+    return Likelihood(Composition.from_file(file), record, told_moves(record), by=DYNAMIC)
+
+
+@pytest.mark.parametrize("file", [SEED, LAG, with_effect(SEED, "preload", force_n=300.0)])
+def test_told_when_it_moves_the_true_valve_leaves_the_noise(file: ValveFile) -> None:
+    record = ready(recording(file))
+    like = likelihood(file, record)
+    _, groups = with_onsets(like, like.composition.theta)
+    assert len(like.moves) >= 4
+    for each in (groups.motion, groups.rests):
+        assert np.sqrt(np.mean(each**2)) < 1.25
+    assert np.sqrt(np.mean(groups.landings**2)) < 2.0
+
+
+def test_static_friction_has_no_part_in_when_a_told_stem_moves() -> None:
+    record = ready(recording(SEED))
+    like = likelihood(SEED, record)
+    theta = like.composition.theta.copy()
+    onsets_s = like.run.first_onsets_s()
+    before = like.run.run(theta, onsets_s)
+    theta[STATIC] *= 1.1
+    after = like.run.run(theta, onsets_s)
+    assert np.abs(before.indicated_m - after.indicated_m).max() < NOISE_M, "only where a slide dies away"
+
+
+def test_each_break_away_has_static_friction_between_what_the_rest_bore_and_what_broke_it_loose() -> None:
+    record = ready(recording(SEED))
+    like = likelihood(SEED, record)
+    theta = like.composition.theta
+    path = like.run.run(theta, with_onsets(like, theta)[0])
+    allowed_n = 0.03 * theta[COULOMB]
+    assert np.all(path.bears_n <= theta[STATIC] + allowed_n)
+    assert np.all(path.breaks_n >= theta[STATIC] - allowed_n)
+    assert np.any(path.breaks_n - path.bears_n < allowed_n), "a ramp tells it closely"
+
+
+def test_a_slip_that_a_free_run_mistimes_costs_the_likelihood_what_its_break_away_is_off() -> None:
+    record = ready(recording(SEED))
+    like, composition = likelihood(SEED, record), Composition.from_file(SEED)
+    free = FreeRun(composition, record)
+    onsets_s, _ = with_onsets(like, composition.theta)
+    told, alone = [], []
+    for share in np.linspace(0.97, 1.03, 31):
+        theta = composition.theta.copy()
+        theta[STATIC] *= share
+        told.append(float(soft(like.at(theta, onsets_s).whole).sum()))
+        error_m = free.position_m(theta) - record.position_m
+        alone.append(float(soft(error_m[record.valid] / NOISE_M).sum()))
+    assert np.ptp(alone) > 20.0 * np.ptp(told)
+    assert np.all(np.diff(told, 2) > -0.2), "convex but for the noise: there is one end"
+
+
+def test_a_rest_is_held_whatever_the_command_says_of_it() -> None:
+    record = ready(recording(SEED))
+    record = replace(record, command_pa=record.command_pa + 2e4)
+    run = ToldRun(Composition.from_file(SEED), record, told_moves(record))
+    first = run.moves[0]
+    rest = run.run(Composition.from_file(SEED).theta, run.first_onsets_s()).indicated_m[: first.before]
+    assert np.ptp(rest) < 1e-9

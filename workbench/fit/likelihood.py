@@ -1,0 +1,182 @@
+"""One likelihood for a valve that sticks: where the stem is, told when it moves, and what it takes to break it loose.
+
+    p(record | valve) = p(where the stem is | when it moves, valve) p(when it moves | valve)
+
+First factor. A simulation is told the moves (`workbench.model.told_run`). With e_i = simulated - measured position, m:
+
+    r_i = e_i / sigma                               samples in motion
+    r_l = mean(e) / sqrt(sigma^2 / n + tau^2)       a rest of n samples: where the slide landed
+    r_b = (mean_b(e) - mean(e)) sqrt(n_b) / sigma   blocks b of n_b samples of it: what still creeps there
+
+sigma the noise, tau = `landing` sigma. Second factor. F_s lies between L_bears, what a rest bore, and L_breaks, what
+broke it loose:
+
+    r_k = max(L_bears - F_s, F_s - L_breaks, 0) / (`break_away` F_c)
+
+The cost is the soft L1 of all, s^2 (sqrt(1 + (r / s)^2) - 1) summed, s = `soft`. It is smooth in every parameter:
+nothing in it asks whether a slip happened.
+"""
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+from typing import NamedTuple
+
+import numpy as np
+import numpy.typing as npt
+
+from sim.composition import COULOMB, STATIC, Composition
+from sim.karnopp import Vector
+from workbench.data.record import Record
+from workbench.model.sampling import Sampling
+from workbench.model.told_run import ToldMove, ToldPath, ToldRun
+
+Rows = npt.NDArray[np.int64]
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Weights:
+    """How residuals are weighed."""
+
+    block: int = 20
+    """Samples of a block of a rest: at 200 Hz a lag of the sensor shows in blocks of a tenth of a second."""
+    landing: float = 0.1
+    """tau, in sigma: no simulation is believed more closely, however long a rest is averaged."""
+    break_away: float = 0.01
+    """Of F_c, to which a break-away tells static friction: an onset is known to a part of a sample."""
+    soft: float = 5.0
+    """Residuals beyond which one counts by its amount alone: a wild sample is no evidence."""
+    before: int = 3
+    """Samples before a move that count one by one: so early its onset may be, and each of them speaks against it."""
+    wild: float = 1e4
+    """Residual of a sample where the model has no answer."""
+
+
+WEIGHTS = Weights()
+
+
+class Groups(NamedTuple):
+    """The residuals by what they tell."""
+
+    motion: Vector
+    landings: Vector
+    rests: Vector
+    """Blocks."""
+    break_aways: Vector
+
+    @property
+    def whole(self) -> Vector:
+        """All of them, one after another."""
+        return np.concatenate(self)
+
+
+@dataclass(frozen=True, slots=True)
+class Layout:
+    """Which samples of a record each residual is made of."""
+
+    moving: Rows
+    resting: Rows
+    """Samples at rest, in order."""
+    starts: Rows
+    """Where among these each block begins."""
+    count: Rows
+    """Samples of each block."""
+    rest_of: Rows
+    """The rest that each block belongs to."""
+    per_rest: Rows
+    """Samples of each rest."""
+    rest_after: Rows
+    """The rest that each move ends in, (moves,); -1: none that is judged."""
+
+
+def layout(record: Record, told: Sequence[ToldMove], weights: Weights = WEIGHTS) -> Layout:
+    """Return the layout of a record: what is not in a move is at rest."""
+    state = np.full(len(record), -2, dtype=np.int64)  # -2 not judged, -1 moving, k in the k-th rest
+    rests, after = 0, np.zeros(len(told), dtype=np.int64)
+    for number, (first, end) in enumerate(record.segments):
+        state[first:end] = rests
+        rests += 1
+        for k, move in enumerate(told):
+            if move.segment == number:
+                state[first_in_motion(move, weights) : move.after] = -1
+                state[move.after : end] = after[k] = rests
+                rests += 1
+    state[~record.valid] = -2
+    resting = np.flatnonzero(state >= 0)
+    names, of = np.unique(state[resting], return_inverse=True)
+    first_of = np.searchsorted(of, np.arange(names.size))
+    within = np.arange(resting.size) - first_of[of]
+    starts = np.flatnonzero(within % weights.block == 0)
+    count = np.diff(np.append(starts, resting.size))
+    at = {int(name): i for i, name in enumerate(names)}
+    return Layout(
+        moving=np.flatnonzero(state == -1),
+        resting=resting,
+        starts=starts,
+        count=count,
+        rest_of=of[starts],
+        per_rest=np.bincount(of, minlength=names.size),
+        rest_after=np.array([at.get(int(each), -1) for each in after], dtype=np.int64),
+    )
+
+
+def first_in_motion(move: ToldMove, weights: Weights = WEIGHTS) -> int:
+    """Return the first row of a move that counts by itself."""
+    return max(move.before + 1 - weights.before, move.rested_from + 1)
+
+
+class Likelihood:
+    """The residuals of a composition that is told through a record, of a parameter vector and onsets, s.
+
+    Raises:
+        InputError: as `workbench.model.free_run.FreeRun`.
+    """
+
+    def __init__(
+        self,
+        composition: Composition,
+        record: Record,
+        told: Sequence[ToldMove],
+        *,
+        by: Sampling,
+        from_pressure: bool = False,
+        weights: Weights = WEIGHTS,
+    ) -> None:
+        self.composition, self.record, self.weights = composition, record, weights
+        self.run = ToldRun(composition, record, tuple(told), by=by, from_pressure=from_pressure)
+        self.layout = layout(record, told, weights)
+        self.sigma_m = record.scale_m
+        self.landing_m = self.sigma_m * np.sqrt(1.0 / self.layout.per_rest + weights.landing**2)
+        self.broken = np.array([k for k, each in enumerate(told) if not each.begins_in_motion], dtype=np.int64)
+
+    @property
+    def moves(self) -> tuple[ToldMove, ...]:
+        """What the stem is told."""
+        return self.run.moves
+
+    def at(self, theta: Vector, onsets_s: Vector) -> Groups:
+        """Simulate; return the residuals."""
+        return self.of_path(self.run.run(theta, onsets_s), theta)
+
+    def of_path(self, path: ToldPath, theta: Vector) -> Groups:
+        """Return the residuals of a path."""
+        most = self.weights.wild
+        rows = self.layout
+        e = np.nan_to_num(
+            (path.indicated_m - self.record.position_m) / self.sigma_m, nan=most, posinf=most, neginf=-most
+        )
+        e = np.clip(e, -most, most)
+        sums = np.add.reduceat(e[rows.resting], rows.starts) if rows.starts.size else np.empty(0)
+        mean = np.bincount(rows.rest_of, sums) / rows.per_rest
+        blocks = (sums / rows.count - mean[rows.rest_of]) * np.sqrt(rows.count)
+        return Groups(e[rows.moving], mean * self.sigma_m / self.landing_m, blocks, self.break_rows(path, theta))
+
+    def break_rows(self, path: ToldPath, theta: Vector) -> Vector:
+        """Return the residuals of the second factor."""
+        F_s, bears, breaks = float(theta[STATIC]), path.bears_n[self.broken], path.breaks_n[self.broken]
+        off = np.maximum(np.maximum(bears - F_s, F_s - breaks), 0.0) / (self.weights.break_away * float(theta[COULOMB]))
+        return np.clip(np.nan_to_num(off, nan=self.weights.wild), 0.0, self.weights.wild)
+
+
+def soft(r: Vector, scale: float = WEIGHTS.soft) -> Vector:
+    """Return the soft-L1 cost of each residual."""
+    return np.asarray(scale**2 * (np.sqrt(1.0 + (r / scale) ** 2) - 1.0))
