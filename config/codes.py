@@ -193,12 +193,7 @@ class Refusal(Code):
         "the motion does not tell the mass: pressure changes, or samples follow, too slowly; "
         "only b/c and k/c can be known",
     )
-    MODEL_DOES_NOT_FIT = (
-        20,
-        "the motion is not that of the model: the residuals outweigh the sensor's noise, or a part of the record "
-        "contradicts the rest, or pressure and position are of two instants (device.sampling, "
-        "identification.pressure_held)",
-    )
+    MODEL_DOES_NOT_FIT = 20, "the motion is not that of the model: the residuals outweigh the sensor's noise"
     LANDINGS_TOO_FEW = 21, "too few slides have ended in rest, or all in one direction"
     LANDINGS_NOT_STRAIGHT = 22, "the landings lie on no straight line: spring or friction change over the travel"
     CONTRADICTED_BY_LANDINGS = (

@@ -42,8 +42,7 @@ from positioner.estimation.likelihood import LikelihoodFit, fit_motions
 from positioner.estimation.linear_problem import Prior
 from positioner.estimation.motion_preparation import CLEAR
 from positioner.estimation.motion_segment import MotionSegment
-from positioner.estimation.record_consistency import contradicts
-from positioner.estimation.segmentation import Segmentation, find_motions, whole_stretch
+from positioner.estimation.segmentation import Segmentation, find_motions
 
 MOST_STRETCHES = 8
 """The farthest motions of a record are fitted together; more add little and cost much."""
@@ -66,10 +65,6 @@ LARGEST_RESIDUAL = 5e-3
 """Share of the travel above which residuals that are not white are a misfit, whatever noise was measured."""
 AS_WELL = 1.1
 """Ratio of the residuals up to which another model explains a motion as well."""
-DRIFTED = 0.1
-"""Of the standard deviation allowed: another value of b/c or k/c that differs by less is none that counts."""
-UNLIKE = 2.0
-"""Deviations by a drift, for what is no drift: nobody knows its course."""
 APART = 3.0
 """Standard deviations beyond which two values of b/c are different ones."""
 ENOUGH_FOR_WHITE = 60
@@ -112,8 +107,6 @@ class BatchResult(Brief):
         segments: how many motions were fitted.
         left_out: how many were found and not fitted.
         condition: of the information matrix of (ln τ, ln μ, ln g, ln q), scaled to a unit diagonal.
-        contradicted: whether the rest of the record contradicts the fit.
-        unsure: relative standard deviations of b/c and k/c if a part of the motion is not the model's.
     """
 
     estimates: Estimates
@@ -124,8 +117,6 @@ class BatchResult(Brief):
     segments: int
     left_out: int
     condition: float
-    contradicted: bool = False
-    unsure: tuple[float, float] = (inf, inf)
 
 
 def identify(
@@ -161,10 +152,7 @@ def identify(
         reason = _why_nothing(best, x, noise_std_m)
         nothing = no_estimates(reason)
         return BatchResult(nothing, None, best.interpolation, False, noise_std_m, 0, best.segmentation.too_short, nan)
-    held = best.interpolation != "linear"
-    drifting = fit_motions(list(best.chosen), held=held, near=best.fit.p[:2], beside="drift")
-    contradicted = _contradicted(best, drifting, t, x, noise_std_m, settings)
-    estimates = _estimates(best, noise_std_m, settings, float(t[-1]), contradicted=contradicted)
+    estimates = _estimates(best, noise_std_m, settings, float(t[-1]))
     return BatchResult(
         estimates=replace(estimates, breakaway=_breakaway(best, estimates, settings.largest_relative_std)),
         fit=best.fit,
@@ -174,8 +162,6 @@ def identify(
         segments=len(best.chosen),
         left_out=best.segmentation.too_short + len(best.segmentation.segments) - len(best.chosen),
         condition=condition(best.fit),
-        contradicted=contradicted,
-        unsure=_unsure(drifting),
     )
 
 
@@ -259,7 +245,7 @@ def _preload_explains_as_well(best: _Hypothesis, noise_std_m: float | None, sett
     """Return whether a force of one direction beside friction explains motions both ways as well, with another b/c."""
     if best.fit is None or len({each.direction for each in best.chosen}) < 2:
         return False
-    again = fit_motions(list(best.chosen), held=best.interpolation != "linear", beside="preload")
+    again = fit_motions(list(best.chosen), held=best.interpolation != "linear", lopsided=True)
     if again is None or again.residual_std_m > max(
         AS_WELL * best.fit.residual_std_m, _allowed_m(best, noise_std_m, settings)
     ):
@@ -267,52 +253,6 @@ def _preload_explains_as_well(best: _Hypothesis, noise_std_m: float | None, sett
     std = sqrt(float(best.fit.covariance[2, 2]) + float(again.covariance[2, 2]))
     apart = abs(float(again.p[2] - best.fit.p[2]))
     return apart > max(APART * std, settings.largest_relative_std * abs(float(best.fit.p[2])))
-
-
-def _unsure(drifting: LikelihoodFit | None) -> tuple[float, float]:
-    """Return relative deviations of b/c and k/c where a part of the motion is not the model's, as a drift would be."""
-    if drifting is None:
-        return inf, inf
-    std = UNLIKE * np.sqrt(np.abs(np.diag(drifting.theta_covariance)) * _widening(drifting)) / np.abs(drifting.theta)
-    return float(std[4]), float(std[5])
-
-
-def _contradicted(
-    best: _Hypothesis,
-    drifting: LikelihoodFit | None,
-    t: Array,
-    x: Array,
-    noise_std_m: float | None,
-    settings: BatchSettings,
-) -> bool:
-    """Return whether the rest of the record contradicts the fit: a sensor that jumped, or drifts."""
-    fit = best.fit
-    if fit is None:
-        return False
-    held, allowed_m = best.interpolation != "linear", _allowed_m(best, noise_std_m, settings)
-    residual_m = max(fit.residual_std_m, allowed_m if allowed_m < inf else 0.0)
-    scale_m = UNSEEN * float(np.ptp(x)) if noise_std_m is None else noise_std_m
-    for each in best.segmentation.stretches:
-        begin_s, end_s = t[each.begin], t[each.end - 1]
-        inside = [part for part in best.chosen if begin_s <= part.time_s[-1] and part.time_s[0] <= end_s]
-        if not inside:
-            continue
-        direction = max(inside, key=lambda part: float(np.ptp(part.position_m))).direction
-        threshold = settings.moving_threshold_m_per_s
-        whole = whole_stretch(each, direction, t, x, best.pressure_pa, scale_m, threshold)
-        if whole is not None and contradicts(whole, fit, residual_m, held=held):
-            return True
-    return drifting is not None and _drifts(fit, drifting, settings)
-
-
-def _drifts(fit: LikelihoodFit, again: LikelihoodFit, settings: BatchSettings) -> bool:
-    """Return whether a sensor that drifts explains the motions better, with another b/c or k/c."""
-    for number in (2, 3):
-        std = sqrt(abs(float(again.covariance[number, number])) * _widening(again))
-        apart = abs(float(again.p[number] - fit.p[number]))
-        if apart > max(SIGNIFICANT * std, DRIFTED * settings.largest_relative_std * abs(float(fit.p[number]))):
-            return True
-    return False
 
 
 def _fitted(
@@ -351,9 +291,7 @@ def condition(fit: LikelihoodFit) -> float:
     return float(sizes[0] / sizes[-1]) if sizes[-1] > 0 else float("inf")
 
 
-def _estimates(
-    best: _Hypothesis, noise_std_m: float | None, settings: BatchSettings, time_s: float, *, contradicted: bool
-) -> Estimates:
+def _estimates(best: _Hypothesis, noise_std_m: float | None, settings: BatchSettings, time_s: float) -> Estimates:
     """Return the estimates of a fit, each valid or with the reason why not."""
     assert best.fit is not None
     fit = _widened(best.fit, settings)
@@ -364,8 +302,6 @@ def _estimates(
         together = Refusal.MODEL_DOES_NOT_FIT
     elif _preload_explains_as_well(best, noise_std_m, settings):
         together = Refusal.PRELOAD_EXPLAINS_AS_WELL
-    elif contradicted:
-        together = Refusal.MODEL_DOES_NOT_FIT
     unphysical = (
         values[0] > 0 and Refusal.A_POSITIVE,
         values[1] >= 0 and Refusal.B_NOT_NEGATIVE,
@@ -388,18 +324,13 @@ def _estimates(
 
 def _widened(fit: LikelihoodFit, settings: BatchSettings) -> LikelihoodFit:
     """Return the fit with the covariance that correlated residuals and noise of the pressure leave."""
-    factor = _widening(fit)
+    factor = 1.0
+    if fit.correlation > SIGNIFICANT:
+        share = min(fit.correlation / sqrt(fit.count), 0.98)
+        factor = (1 + share) / (1 - share)
     drive_m = float(fit.p[2]) * settings.pressure_noise_std_pa
     factor *= 1 + (drive_m / max(fit.residual_std_m, 1e-12)) ** 2
     return replace(fit, covariance=fit.covariance * factor)
-
-
-def _widening(fit: LikelihoodFit) -> float:
-    """Return the factor on variances that correlated residuals leave."""
-    if fit.correlation <= SIGNIFICANT:
-        return 1.0
-    share = min(fit.correlation / sqrt(fit.count), 0.98)
-    return (1 + share) / (1 - share)
 
 
 def _refusal_of_each(best: _Hypothesis, fit: LikelihoodFit, largest: float) -> Refusal:

@@ -21,7 +21,7 @@ from config.results.result import Brief
 from positioner.estimation.array import Array
 from positioner.estimation.likelihood_search import gauss_newton, grid_search, with_start_in_gap
 from positioner.estimation.linear_problem import Prior, linear_problem, sensitivities, started
-from positioner.estimation.motion_preparation import Beside, PreparedMotion, prepared
+from positioner.estimation.motion_preparation import PreparedMotion, prepared
 from positioner.estimation.motion_segment import MotionSegment
 
 
@@ -83,7 +83,7 @@ def fit_motions(
     guess: Array | None = None,
     prior: Prior | None = None,
     near: Array | None = None,
-    beside: Beside | None = None,
+    lopsided: bool = False,
 ) -> LikelihoodFit | None:
     """Fit all motions together, at the minimum of S(p) at the head of this module.
 
@@ -93,12 +93,12 @@ def fit_motions(
         guess: (2,), ln τ and ln μ, τ in s and μ in s^2, to start from beside those of the grid.
         prior: what is known beforehand.
         near: (2,), ln τ and ln μ near enough to need no search.
-        beside: what may act beside the model, one more unknown.
+        lopsided: whether a force of one direction may act beside friction.
 
     Returns:
         The fit; None when the samples are fewer than the unknowns, or carry no motion.
     """
-    motions = [prepared(each, held=held, beside=beside) for each in segments]
+    motions = [prepared(each, held=held, lopsided=lopsided) for each in segments]
     if sum(len(each.position_m) for each in motions) < 6 + 2 * len(motions):
         return None
     start = near if near is not None else grid_search(motions, guess, prior)

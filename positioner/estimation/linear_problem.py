@@ -2,8 +2,8 @@
 
 For given p = (ln τ, ln μ, starts) the model y_i = g X_g + q X_q + x_0 X_0 + v_0 X_1 (`stem_response`) is linear in g, q
 and in every motion's beginning. The columns of all motions stand in one matrix, g and q shared; a prior is four more
-rows; a force of one direction, σ X_q, or a drift of the sensor, t, is one more column where it is allowed, shared by
-all. The derivatives by p are differences.
+rows; a force of one direction, where it is allowed, is one more column, σ X_q, shared by all. The derivatives by p
+are differences.
 """
 
 from dataclasses import dataclass
@@ -61,19 +61,16 @@ def linear_problem(motions: list[PreparedMotion], p: Array, prior: Prior | None)
     blocks = [_columns(each, p) for each in started(motions, p)]
     starts = [each.start_interval for each in motions if each.start_interval is not None]
     rows = sum(len(each) for each in blocks) + len(starts) + (4 if prior is not None else 0)
-    beside = motions[0].beside
-    columns: Array = np.zeros((rows, 2 + sum(each.shape[1] - 2 for each in blocks) + (beside is not None)))
+    lopsided = motions[0].lopsided
+    columns: Array = np.zeros((rows, 2 + sum(each.shape[1] - 2 for each in blocks) + lopsided))
     measured: Array = np.zeros(rows)
     row, column = 0, 2
     for motion, block in zip(motions, blocks, strict=True):
         height, width = len(block), block.shape[1]
         columns[row : row + height, :2] = block[..., :2]
         columns[row : row + height, column : column + width - 2] = block[..., 2:]
-        if beside == "preload":
+        if lopsided:
             columns[row : row + height, -1] = motion.direction * block[..., 1]
-        elif beside == "drift":
-            columns[row : row + height - 1, -1] = (motion.time_s[1:] - motions[0].time_s[0]) * motion.weight
-            columns[row + height - 1, -1] = (motion.time_s[0] - motions[0].time_s[0]) * motion.rest_count**0.5
         measured[row : row + height] = _measured_rows(motion)
         row, column = row + height, column + width - 2
     for start, share in zip(starts, p[2:].tolist(), strict=True):

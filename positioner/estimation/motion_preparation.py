@@ -9,14 +9,11 @@ and v_0 are free.
 
 from dataclasses import dataclass, replace
 from math import inf, nextafter
-from typing import Literal
 
 import numpy as np
 
 from positioner.estimation.array import Array
 from positioner.estimation.motion_segment import MotionSegment
-
-Beside = Literal["preload", "drift"]
 
 MOST_ROWS = 8000
 """A longer motion is averaged in blocks. A block of length T_b shifts μ by T_b^2/24: with 8000 of them nothing."""
@@ -41,7 +38,7 @@ class PreparedMotion:
         free_velocity: whether position and velocity at the start are unknown.
         held: how the pressure goes between the rows.
         start_interval: where the start is unknown; None: `time_s[0]`.
-        beside: what may act beside the model: a preload, that is a force of one direction, or a drift of the sensor.
+        lopsided: whether a force that has one direction, as a preload has, may act beside friction.
     """
 
     direction: int
@@ -54,7 +51,7 @@ class PreparedMotion:
     free_velocity: bool
     held: bool
     start_interval: "StartInterval | None" = None
-    beside: Beside | None = None
+    lopsided: bool = False
 
 
 @dataclass(frozen=True, slots=True)
@@ -77,7 +74,7 @@ class StartInterval:
         return replace(motion, time_s=time_s)
 
 
-def prepared(segment: MotionSegment, *, held: bool, beside: Beside | None = None) -> PreparedMotion:
+def prepared(segment: MotionSegment, *, held: bool, lopsided: bool = False) -> PreparedMotion:
     """Return the rows of a motion, from the jump of a held pressure that began it, or from where it surely moves."""
     jump = _initial_jump(segment, held)
     from_rest = jump is not None
@@ -109,7 +106,7 @@ def prepared(segment: MotionSegment, *, held: bool, beside: Beside | None = None
         rest_count=count,
         free_velocity=not from_rest,
         held=held,
-        beside=beside,
+        lopsided=lopsided,
     )
 
 

@@ -105,8 +105,6 @@ class Identification:
         self._passive = False
         self.moves = 0
         self._rest_in: int | None = None  # samples until a move's rest is long enough
-        self._ended, self._ended_ago = 0, 0  # direction of the last motion if it was too short, samples since it ended
-        self._turned = False  # whether the stem seemed to turn round without a rest: a sensor may have jumped
         self._identifier = Identifier(
             settings.window_s, settings.stroke_m, settings.pressure_pa, pressure_held=settings.pressure_held
         )
@@ -135,7 +133,6 @@ class Identification:
         self._restart_window()
         self._kept.clear()
         self._awaited_since_s = self._rest_in = None
-        self._ended, self._turned = 0, False
         self._relative_variance = inf
         self.estimates = no_estimates(Refusal.WAITING_FOR_MOTION)
 
@@ -238,29 +235,8 @@ class Identification:
             # Of samples that are far from any motion of the model the integrals know nothing either. A loop in real
             # time, whose commands come into force a little early or late, stays well below.
             gross_m = GROSS * self._settings.stroke_m
-            gross = result.fit is not None and result.fit.residual_std_m > gross_m
-            refused = not fits and (gross or result.contradicted)
+            refused = result.fit is not None and not fits and result.fit.residual_std_m > gross_m
             self.estimates = refined if refused else replace(self.estimates, progress=1.0)
-            if result.fit is not None and not fits and not refused:
-                self.estimates = self._less_sure(result.unsure)
-
-    def _less_sure(self, unsure: tuple[float, float]) -> Estimates:
-        """Return the estimates where the refined model leaves a part of the motion: a, b, c, k singly hang on that."""
-        known = self.estimates
-        a, b, c, k = (
-            replace(each, reason=Refusal.MODEL_DOES_NOT_FIT) if each.valid else each
-            for each in (known.a, known.b, known.c, known.k)
-        )
-        slope, friction = self._at_least(known.b_over_c, unsure[0]), self._at_least(known.k_over_c, unsure[1])
-        return replace(known, a=a, b=b, c=c, k=k, b_over_c=slope, k_over_c=friction)
-
-    def _at_least(self, each: Estimate, share: float) -> Estimate:
-        """Return an estimate that is known to no better than a share of its value."""
-        if not each.valid:
-            return each
-        std = max(each.std, share * abs(each.value))
-        unsure = not std <= self._settings.largest_relative_std * abs(each.value)
-        return replace(each, std=std, reason=Refusal.TOO_UNCERTAIN if unsure else Refusal.VALID)
 
     def _request(self, parameters: bool, friction: bool) -> None:
         self._requested = (parameters, friction)
@@ -304,24 +280,14 @@ class Identification:
         before = self._motion.direction
         direction = self._motion.update(slope, self._derivatives.slope_gain * noise_m)
         self._age += 1
-        self._ended_ago += 1
         if direction == before:
             return
         if before:
-            unexamined = self._elapsed_s < self._settings.minimum_window_s
-            self._ended, self._ended_ago = before if unexamined else 0, 0
             self._interrupt(Refusal.MOTION_ENDED)
             if self._passive and any(self._requested):
                 self._rest_in = record.length
         if direction:
             self._age = -motion_start(position_m, direction, noise_m)
-            self._turned = self._turned or self._turns_against_the_pressure(direction)
-
-    def _turns_against_the_pressure(self, direction: int) -> bool:
-        """Whether a stem seems to turn round soon after a motion too short to examine, though the pressure does not."""
-        record = self._record
-        soon = direction == -self._ended and self._ended_ago <= 2 * record.length
-        return soon and direction * float(record.pressure_pa[-1] - record.pressure_pa[0]) <= 0.0
 
     def _collect(self) -> None:
         """Use the oldest sample of the record, on its way out."""
@@ -356,8 +322,6 @@ class Identification:
         progress = min(1.0, self._elapsed_s / self._settings.window_s)
         if self._elapsed_s < self._settings.minimum_window_s:
             return replace(no_estimates(Refusal.WINDOW_TOO_SHORT), progress=progress)
-        if self._turned and not self._passive:
-            return replace(no_estimates(Refusal.MODEL_DOES_NOT_FIT), progress=progress)
         a, b, c, b_over_c = self._read_parameters()
         k, k_over_c = self._read_friction()
         return Estimates(a, b, c, k, b_over_c, k_over_c, progress=progress, time_s=time_s)
