@@ -128,7 +128,10 @@ class InhibitReason(Code):
         25,
         "excitation: eta_1 = 0 is from before a fault, or before another mode: write 1, then 0",
     )
-    STAIRCASE_REVERSED = 26, "the staircase of slides: more pressure takes the stem down: one of the two is reversed"
+    STAIRCASE_REVERSED = (
+        26,
+        "the staircase of slides: more pressure takes the stem down: one of the two is reversed, or [valve] action",
+    )
     CUT_OFF = 27, "the reference is beyond a cut-off, so the stem is pressed onto its stop"
     PRESSURE_ELSEWHERE = 28, "a slide waits, for the measured pressure is not the one commanded: the supply may be low"
 

@@ -38,6 +38,7 @@ from config.loading import (
 from config.record_tables import HistoryTable, RecorderTable
 from config.supervision_table import SafetyTable, SupervisionTable
 from config.tls_table import Tls
+from config.travel import ActionWord, Travel
 
 
 def _written(network: object) -> object:
@@ -49,13 +50,37 @@ def _written(network: object) -> object:
 Network = Annotated[IPvAnyNetwork, BeforeValidator(_written)]
 
 
+NOT_POSITIONED = {
+    "double_acting": "a cylinder without a spring needs a second pressure, commanded and measured, and a law for their "
+    "difference; allowed is spring_return",
+    "booster": "a volume booster needs its rates of filling and venting, which a law must know; set its bypass so that "
+    "pressure follows its command within a cycle, and write spring_return",
+}
+"""Actuators that people have and that no law here commands: what would be needed."""
+
+
+def _positioned(actuator: object) -> object:
+    if isinstance(actuator, str) and actuator in NOT_POSITIONED:
+        raise ValueError(f"is not positioned: {NOT_POSITIONED[actuator]}")
+    return actuator
+
+
 class ValveTable(Schema):
     """Table `[valve]`: what the controller must know of the valve before it identifies anything."""
 
     name: Label = "valve"
     stroke_m: Stroke
+    action: ActionWord = "air_to_open"
+    """What more air does; openings count from the closed end (`config.travel`)."""
+    actuator: Annotated[Literal["spring_return"], BeforeValidator(_positioned)] = "spring_return"
+    """One pressure against a spring."""
     breakaway_pa: Pressure | None = None
     """F_s / A where it is known: the excitation's constant part must exceed it."""
+
+    @property
+    def travel(self) -> Travel:
+        """Where the stem stands at which opening."""
+        return Travel.of(self.stroke_m, self.action)
 
 
 class CycleTable(Schema):

@@ -15,6 +15,7 @@ from config.modbus_map import SIMULATED_MAP, ModbusMap
 from config.quantities import ActionName
 from config.serial_port import RtuUnit, SerialPort
 from config.tls_table import Tls
+from config.travel import ActionWord
 from config.valve_file import shipped_valve
 
 
@@ -158,6 +159,8 @@ class SlaveFile(Schema):
     """A whole slave file. `valve` is a path from this file's folder, or the name of a shipped valve."""
 
     valve: str = "seed"
+    action: ActionWord = "air_to_open"
+    """Its position transmitter counts from the closed end, where `initial` has the stem as pressure drives it."""
     bus: AnyBus = ModbusTcpBus()
     clock: SlaveClock = SlaveClock()
     sensor: Sensor = Sensor()

@@ -45,7 +45,8 @@ def run(arguments: argparse.Namespace) -> int:
     files = load_valves(path)
     well = _passes("packages", "", _packages)
     for file in files:
-        print(f"{'config':12} ok    {path}: {file.valve.name}, stroke {file.valve.stroke_m:g} m")
+        travel = file.valve.travel
+        print(f"{'config':12} ok    {path}: {file.valve.name}, stroke {travel.stroke_m:g} m, {travel.words}")
     nudge_pa: float | None = arguments.nudge_pa
     nudged = () if nudge_pa is None else (("sampling", partial(_sampling, nudge_pa)),)
     checks: list[tuple[str, Check, DaemonFile]] = [

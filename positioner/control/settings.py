@@ -131,33 +131,30 @@ def _within_supply(file: DaemonFile, valve: ExtendedValve | None) -> DaemonFile:
 
 
 def _cutoffs(file: DaemonFile) -> Cutoffs:
-    low, high, stroke_m = file.control.cutoff_low, file.control.cutoff_high, file.valve.stroke_m
-    return Cutoffs(
-        low_m=-inf if low is None else low * stroke_m,
-        high_m=inf if high is None else high * stroke_m,
-        hysteresis_m=HYSTERESIS * stroke_m,
-    )
+    low, high = file.control.cutoff_low, file.control.cutoff_high
+    low_m, high_m = file.valve.travel.window_m((-inf if low is None else low, inf if high is None else high))
+    return Cutoffs(low_m=low_m, high_m=high_m, hysteresis_m=HYSTERESIS * file.valve.stroke_m)
 
 
 def _staircase(file: DaemonFile) -> StaircaseLimits:
-    low, high = (share * file.valve.stroke_m for share in file.excitation.travel_window)
+    low, high = file.valve.travel.window_m(file.excitation.travel_window)
     return StaircaseLimits(low, high, file.pressure.minimum_pa, file.pressure.maximum_pa, file.valve.stroke_m)
 
 
 def _excitation(file: DaemonFile) -> ExcitationLimits:
     table = file.excitation
-    low, high = table.permitted_travel or (-inf, inf)
+    low_m, high_m = file.valve.travel.window_m(table.permitted_travel or (-inf, inf))
     return ExcitationLimits(
         longest_s=table.staircase_limit_s if file.by_slides else table.limit_s,
-        low_m=low * file.valve.stroke_m,
-        high_m=high * file.valve.stroke_m,
+        low_m=low_m,
+        high_m=high_m,
         by_consent=table.consent,
     )
 
 
 def _experiment(file: DaemonFile) -> ExperimentLimits:
     table, pressure = file.experiment, file.pressure
-    low, high = (share * file.valve.stroke_m for share in table.travel_window)
+    low, high = file.valve.travel.window_m(table.travel_window)
     return ExperimentLimits(
         minimum_pa=pressure.minimum_pa if table.minimum_pa is None else max(pressure.minimum_pa, table.minimum_pa),
         maximum_pa=pressure.maximum_pa if table.maximum_pa is None else min(pressure.maximum_pa, table.maximum_pa),

@@ -95,12 +95,13 @@ def _position_doubt(file: DaemonFile, held_pa: float, reading: Reading) -> str:
         return ""
     pressure_pa = held_pa if reading.pressure_pa is None else reading.pressure_pa
     low_m, high_m = _resting_m(law, law.b_over_c_pa_per_m, law.k_over_c_pa, pressure_pa, file.valve.stroke_m)
-    if low_m <= reading.position_m <= high_m:
+    position_m = file.valve.travel.turned_m(reading.position_m)
+    if low_m <= position_m <= high_m:
         return ""
     for times in TEN_TIMES:
-        if low_m <= reading.position_m / times <= high_m:
+        if low_m <= position_m / times <= high_m:
             return (
-                f"position {reading.position_m:g} m is {times:g} times what [law] has at {pressure_pa:g} Pa, "
+                f"position {position_m:g} m is {times:g} times what [law] has at {pressure_pa:g} Pa, "
                 f"{max(low_m, 0):g} to {high_m:g} m: device.map.position_m.scale, or valve.stroke_m?"
             )
     return ""

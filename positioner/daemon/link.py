@@ -23,6 +23,7 @@ from dataclasses import dataclass, replace
 from config.codes import Quality
 from config.daemon_file import DaemonFile
 from config.quantities import ActionName, DeviceStatus
+from config.travel import Travel
 from drivers.boundary import Driver, DriverError, KeepsSettings, NoNumber, NoReply, Reading, ReadsBack, Refused
 from positioner.control.sample import Sample
 from positioner.daemon.backoff import Backoff, Sayings
@@ -68,6 +69,8 @@ class LinkSettings:
     """The longest from one attempt to reach it to the next."""
     on_shared_line: bool = False
     """Whether an attempt keeps others waiting."""
+    travel: Travel | None = None
+    """Turns the device's position, which counts from the closed end, to the stem's; None: it is the stem's."""
 
     @classmethod
     def of(cls, file: DaemonFile, tolerance_pa: float) -> "LinkSettings":
@@ -87,6 +90,7 @@ class LinkSettings:
             acts_alone_by=file.device.acts_alone_by,
             retry_every_s=file.device.longest_retry_s,
             on_shared_line=file.device.on_shared_line,
+            travel=file.valve.travel,
         )
 
 
@@ -353,13 +357,13 @@ class Link:
 
     def _fresh(self, reading: Reading, command_pa: float, before_pa: float | None = None) -> Sample:
         """Return a reading as a sample; it answers `command_pa`, and the command before it was `before_pa`."""
-        now_s = self._pace.now_s(reading.device_time_s)
+        now_s, travel = self._pace.now_s(reading.device_time_s), self._settings.travel
         repeated = self._count(reading)
         self._reading = reading
         return Sample(
             now_s=now_s,
             time_s=now_s if reading.device_time_s is None else reading.device_time_s,
-            position_m=reading.position_m,
+            position_m=reading.position_m if travel is None else travel.turned_m(reading.position_m),
             pressure_pa=self._acted_pa(reading, command_pa, before_pa),
             quality=Quality.REPEATED if repeated else Quality.GOOD,
             status=reading.status,

@@ -86,7 +86,7 @@ class ServedValve:
         state = partial(service_state, limits=settings.limits, shadow=self.file.cycle.shadow)
         return SupervisoryRegisters(
             self.cycle,
-            settings.limits.stroke_m,
+            self.file.valve.travel,
             settings.minimum_pa,
             settings.maximum_pa,
             self.name,

@@ -35,6 +35,7 @@ from config.registers import (
     WORD_TEST,
     Register,
 )
+from config.travel import Travel
 from fieldbus.modbus.register_answers import RegisterError, Table
 from fieldbus.modbus.request_counts import RequestCounts
 from positioner.control.controller_memory import Decision
@@ -68,7 +69,7 @@ class SupervisoryRegisters:
     def __init__(
         self,
         cycle: Cycle,
-        stroke_m: float,
+        travel: Travel,
         minimum_pa: float,
         maximum_pa: float,
         valve: str | None = None,
@@ -78,12 +79,12 @@ class SupervisoryRegisters:
     ) -> None:
         self._cycle = cycle
         self._valve = valve
-        self._stroke_m = stroke_m
+        self._travel = travel
         self._minimum_pa = minimum_pa
         self._maximum_pa = maximum_pa
         self._heartbeat = 0
         self._lines = LinesPerPeer()
-        self._values = _getters(cycle, stroke_m) | {"service": lambda s, _: state(s.decision)}
+        self._values = _getters(cycle, travel) | {"service": lambda s, _: state(s.decision)}
         self._values |= site_getters(requests or RequestCounts(), locked)
         self._locked = locked
 
@@ -205,7 +206,7 @@ class SupervisoryRegisters:
         reference = values.get("reference", scaled)
         if abs(reference - scaled) > 1 / SCALE:
             raise WriteRejected(ExcCodes.ILLEGAL_VALUE, "reference and reference_scaled disagree in one request")
-        return reference * self._stroke_m
+        return self._travel.stem_m(reference)
 
     def _mode(self, value: float) -> Mode:
         mode, fault = Mode(int(value)), self._cycle.snapshot.decision.fault
@@ -234,15 +235,15 @@ def _as_of_now(cycle: Cycle) -> Snapshot:
     return snapshot.stalled() if stands_still else snapshot
 
 
-def _getters(cycle: Cycle, stroke_m: float) -> dict[str, Getter]:
+def _getters(cycle: Cycle, travel: Travel) -> dict[str, Getter]:
     """Return, by register, what it serves of a snapshot."""
     getters = {
-        **_command_getters(stroke_m),
-        **_status_getters(cycle, stroke_m),
-        **_estimate_getters(stroke_m),
+        **_command_getters(travel),
+        **_status_getters(cycle, travel),
+        **_estimate_getters(travel.stroke_m),
         **_statistics_getters(cycle),
         **_identity_getters(),
-        **_health_getters(cycle, stroke_m),
+        **_health_getters(cycle, travel.stroke_m),
         **experiment_getters(),
         **event_getters(cycle),
     }
@@ -251,10 +252,10 @@ def _getters(cycle: Cycle, stroke_m: float) -> dict[str, Getter]:
     return getters
 
 
-def _command_getters(stroke_m: float) -> dict[str, Getter]:
+def _command_getters(travel: Travel) -> dict[str, Getter]:
     def reference(snapshot: Snapshot, requests: Requests) -> float:
         written = requests.reference_writes > 0
-        return (requests.reference_m if written else snapshot.decision.reference_m) / stroke_m
+        return travel.opening(requests.reference_m if written else snapshot.decision.reference_m)
 
     return {
         "reference": reference,
@@ -271,21 +272,21 @@ def _command_getters(stroke_m: float) -> dict[str, Getter]:
     }
 
 
-def _status_getters(cycle: Cycle, stroke_m: float) -> dict[str, Getter]:
+def _status_getters(cycle: Cycle, travel: Travel) -> dict[str, Getter]:
     return {
         "state": lambda s, _: s.decision.state,
         "fault": lambda s, _: s.decision.fault,
         "quality": lambda s, _: s.sample.quality,
         "why": lambda s, _: s.decision.inhibit_reason,
-        "position": lambda s, _: s.sample.position_m / stroke_m,
-        "position_scaled": lambda s, _: SCALE * s.sample.position_m / stroke_m,
+        "position": lambda s, _: travel.opening(s.sample.position_m),
+        "position_scaled": lambda s, _: SCALE * travel.opening(s.sample.position_m),
         "device_status": lambda s, _: s.sample.status,
-        "position_m": lambda s, _: s.sample.position_m,
+        "position_m": lambda s, _: travel.turned_m(s.sample.position_m),
         "pressure": lambda s, _: s.sample.pressure_pa,
         "command": lambda s, _: s.decision.command_pa,
-        "delta_r": lambda s, _: s.decision.delta_r_m / stroke_m,
+        "delta_r": lambda s, _: travel.opening_change(s.decision.delta_r_m),
         "sample_age": lambda s, _: s.decision.sample_age_s + cycle.since_s(s),
-        "reference_in_force": lambda s, _: s.decision.reference_m / stroke_m,
+        "reference_in_force": lambda s, _: travel.opening(s.decision.reference_m),
         "emergency": lambda s, _: s.sample.emergency,
         "restored": lambda s, _: s.decision.restoration.trust,
         "restored_agreed": lambda s, _: s.decision.restoration.ups + s.decision.restoration.downs,

@@ -8,11 +8,13 @@ from pathlib import Path
 import numpy as np
 
 from config.recording import Column, Recording
+from config.travel import Travel
 from positioner.daemon.recorder import COLUMNS, files_of
 from positioner.observer.trends import WAITING
 from positioner.observer.valve_view import ValveView
 from positioner.response import ResponseFigures, respond
 
+COUNTED = frozenset({"position_m", "reference_m"})
 WRITTEN_WITHIN_S = 10.0
 """A recording that is not written any more is not of the last minutes."""
 LONGEST_TAIL_BYTES = 12_000_000
@@ -28,7 +30,14 @@ class LastMoves:
     response: ResponseFigures
 
 
-def last_moves(view: ValveView, now_s: float, seconds: float, folder: Path | None, wall_s: float) -> LastMoves | None:
+def last_moves(
+    view: ValveView,
+    now_s: float,
+    seconds: float,
+    folder: Path | None,
+    wall_s: float,
+    travel: Travel | None = None,
+) -> LastMoves | None:
     """Return the last minutes of a valve, None while nothing was measured.
 
     Args:
@@ -37,8 +46,12 @@ def last_moves(view: ValveView, now_s: float, seconds: float, folder: Path | Non
         seconds: how much.
         folder: where the daemon records, None where it does not.
         wall_s: now on the clock that files are stamped by.
+        travel: of the valve: a recording has the stem, and what is returned counts from the closed end.
     """
     recording = None if folder is None else recorded_tail(folder, view.name, seconds, wall_s)
+    if recording is not None and travel is not None and travel.closes:
+        turned = {name: travel.stroke_m - recording.columns[name] for name in COUNTED & recording.columns.keys()}
+        recording = Recording({**recording.columns, **turned})
     source = "the daemon's recording, at its full rate"
     if recording is None:
         recording = polled(view.trend(now_s - seconds))

@@ -16,7 +16,7 @@ from positioner.control.settings import Settings
 from positioner.control.valve_knowledge import ValveKnowledge
 from positioner.daemon.cycle import Cycle
 from positioner.daemon.health import Health, HealthSettings
-from positioner.daemon.link import Link
+from positioner.daemon.link import Link, LinkSettings
 from positioner.daemon.pacing import DevicePace
 from positioner.daemon.snapshot import Snapshot
 from positioner.estimation.refiner import InProcessRefiner
@@ -53,7 +53,7 @@ def lockstep_cycle(
         restored: what was known of the valve before.
     """
     pace = DevicePace()
-    link = Link(driver, pace)
+    link = Link(driver, pace, LinkSettings(travel=daemon.valve.travel))
     held_pa, _ = link.open()
     health = Health(HealthSettings.of(daemon.health, daemon.valve.stroke_m))
     controller = Controller(settings or Settings.of(daemon), held_pa, InProcessRefiner(), restored)

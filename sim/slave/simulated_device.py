@@ -19,6 +19,7 @@ import numpy as np
 
 from config.quantities import CommunicationAction, DeviceStatus
 from config.slave_file import DeviceFault, SlaveFile
+from config.travel import Travel
 from sim.parameter_changes import Changes
 from sim.slave.faults import Faults
 from sim.transmitter import Transmitter
@@ -57,7 +58,7 @@ class Plant(Protocol):
 
 
 class Device:
-    """A simulated device.
+    """A simulated device; its position transmitter counts from the closed end (`config.travel`).
 
     Args:
         valve: the valve at rest, as it is when the device is switched on.
@@ -75,6 +76,7 @@ class Device:
         # The limit as a float32 register can say it, so that "exactly the maximum" is not refused for its rounding.
         self._maximum_pa = max(file.supply.maximum_pa, float(np.float32(file.supply.maximum_pa)))
         self._transmitter = Transmitter(file.sensor)
+        self._turned = Travel.of(parameters["stroke_m"], file.action) if file.action == "air_to_close" else None
         self._changes = Changes(file.change, parameters)
         self._file = file
         self._faults = Faults(file.fault)
@@ -225,7 +227,10 @@ class Device:
         if found.restarts:
             self._boot()
         # The transmitter goes on in any case, so that a fault does not change the noise after it.
-        position_m = self._transmitter.measure(self._valve.indicated_m)
+        indicated_m = self._valve.indicated_m
+        position_m = self._transmitter.measure(
+            indicated_m if self._turned is None else self._turned.turned_m(indicated_m)
+        )
         if found.freezes:
             return
         self._shown = self._samples - self._started

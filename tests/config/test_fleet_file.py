@@ -77,7 +77,7 @@ def test_the_valves_are_found_by_name(tmp_path: Path) -> None:
         (FIRST + SECOND.replace("unit = 2\n", ""), "valve 2 (B): valve.unit: is required and missing"),
         (FIRST + SECOND.replace("name = 'B'\n", ""), "valve 2: valve.name: is required and missing"),
         (FIRST + SECOND.replace("unit = 2", "unit = 0"), "valve 2 (B): supervisory.unit: Input should be greater"),
-        (FIRST.replace("stroke_m", "strok_m"), "valve 1 (A): valve.strok_m: unknown key; allowed here: breakaway_pa,"),
+        (FIRST.replace("stroke_m", "strok_m"), "valve 1 (A): valve.strok_m: unknown key; allowed here: action,"),
         (FIRST + SECOND.replace("port = 2", "prt = 2"), "valve 2 (B): device.prt: unknown key; allowed here: bus,"),
         ("[supervisory]\nunit = 3\n" + FIRST, "valve 1 (A): supervisory.unit: each of several valves has its own"),
         ("valve = [1]\n", "valve 1: is not a table"),

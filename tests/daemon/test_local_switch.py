@@ -6,6 +6,7 @@ import pytest
 from pymodbus.constants import ExcCodes
 
 from config.codes import Mode
+from config.travel import Travel
 from positioner.daemon.local_switch import locks_out
 from positioner.daemon.supervisory_registers import SupervisoryRegisters
 from tests.daemon.history.test_history_keeper import Site
@@ -15,7 +16,7 @@ from tests.daemon.test_supervisory_registers import refused
 def test_the_switch_locks_out_all_writes_but_the_heartbeat_and_is_an_event(tmp_path: Path) -> None:
     switch = tmp_path / "local"
     site, locked = Site(tmp_path), locks_out(switch)
-    site.panel.registers = SupervisoryRegisters(site.panel.cycle, 0.1016, 0.0, 200e3, locked=locked)
+    site.panel.registers = SupervisoryRegisters(site.panel.cycle, Travel(0.1016), 0.0, 200e3, locked=locked)
     site.valve.locked = locked
     site.panel.set("mode", Mode.AUTOMATIC)
     switch.write_text("1\n")

@@ -11,6 +11,7 @@ from config.codes import Fault, InhibitReason, Mode, Ne107Status, Quality
 from config.daemon_file import DaemonFile
 from config.registers import BY_NAME, FLOAT_TEST, LONG_TEST, SIZE, WORD_TEST
 from config.slave_file import SlaveFile
+from config.travel import Travel
 from config.valve_file import shipped_valve
 from drivers.boundary import Capabilities, NoConnection, Reading
 from fieldbus.modbus.register_answers import RegisterError
@@ -41,7 +42,7 @@ class Panel:
         )
         slave = SlaveFile.model_validate({"clock": {"mode": "lockstep"}, "initial": {"position_m": 0.02}})
         self.cycle: Cycle = virtual_cycle(daemon, device_of(slave, shipped_valve("seed")), Requests())
-        self.registers = SupervisoryRegisters(self.cycle, STROKE_M, 0.0, 200e3)
+        self.registers = SupervisoryRegisters(self.cycle, Travel(STROKE_M), 0.0, 200e3)
 
     def get(self, name: str) -> float:
         register = BY_NAME[name]

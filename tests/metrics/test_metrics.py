@@ -14,6 +14,7 @@ from prometheus_client.parser import text_string_to_metric_families
 
 from config.codes import Fault
 from config.registers import JITTER_BOUNDS_S
+from config.travel import Travel
 from fieldbus.modbus.request_counts import RequestCounts
 from fieldbus.modbus.server import RegisterServer
 from positioner.cli.main import main
@@ -38,7 +39,7 @@ class Site:
     def __init__(self) -> None:
         self.panel = Panel()
         counts = RequestCounts()
-        self.panel.registers = SupervisoryRegisters(self.panel.cycle, 0.1016, 0.0, 200e3, requests=counts)
+        self.panel.registers = SupervisoryRegisters(self.panel.cycle, Travel(0.1016), 0.0, 200e3, requests=counts)
         self.server = RegisterServer(self.panel.registers, "127.0.0.1", 0, 1, counts=counts)
         self.server.start()
         self.valve = ScrapedValve("FV-101", ("127.0.0.1", self.server.port, 1))

@@ -14,6 +14,7 @@ from config.codes import Mode
 from config.device import ModbusTcpDevice
 from config.errors import CommandFailed
 from config.slave_file import SlaveFile
+from config.travel import Travel
 from drivers import driver_for
 from fieldbus.modbus.server import RegisterServer
 from positioner.cli.parts.children import port_in, running
@@ -45,7 +46,7 @@ def outcome_on_modbus(case: FlowCase) -> FlowOutcome:
         cycle = lockstep_cycle(daemon, driver_for(device), Requests())
         on_exit.callback(cycle.link.release)
         limits = daemon.pressure
-        registers = SupervisoryRegisters(cycle, STROKE_M, limits.minimum_pa, limits.maximum_pa)
+        registers = SupervisoryRegisters(cycle, Travel(STROKE_M), limits.minimum_pa, limits.maximum_pa)
         server = RegisterServer(registers, "127.0.0.1", 0, 1)
         server.start()
         on_exit.callback(server.stop)

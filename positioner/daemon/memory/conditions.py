@@ -21,6 +21,9 @@ OF_THE_LINK = frozenset(
 )
 """These say how the device is talked to, not what it is."""
 
+AS_EVER = frozenset({("valve.action", '"air_to_open"'), ("valve.actuator", '"spring_return"')})
+"""What every valve was before there was a word for it: a file of then says the same."""
+
 EXTENDED = "the file of law.valve, its digest"
 
 PRESSURES = frozenset({"command_pa", "pressure_pa"})
@@ -34,6 +37,8 @@ def conditions_of(file: DaemonFile, extended: ExtendedValve | None = None) -> Co
     """Return the keys that what is known of a valve hangs on, with their values; of an extended valve a digest."""
     tables = file.model_dump(mode="json")
     flat = _flat({key: tables[key] for key in TABLES} | {"cycle": {"period_s": file.cycle.period_s}})
+    for key in AS_EVER & flat.items():
+        del flat[key[0]]
     if extended is not None:
         flat[EXTENDED] = sha256(repr(astuple(extended)).encode()).hexdigest()
     return {key: value for key, value in sorted(flat.items()) if not _of_the_link(key)}

@@ -9,6 +9,7 @@ from collections.abc import Iterator
 from dataclasses import dataclass
 
 from config.daemon_file import DaemonFile
+from config.travel import Travel
 from positioner.observer.valve_view import ValvePicture
 from positioner.observer.waiting_reference import Writer, waiting_reference
 from positioner.pages.parts.units import Units
@@ -66,9 +67,8 @@ class Ahead:
         """Say what a pressure by hand is going to do."""
         now_pa, shown = self.picture.value("command"), self.units.pressure.text
         lines = [f"The command goes from {shown(now_pa)} to {shown(pressure_pa)} at once, and stays there."]
-        slope, offset_pa = self._balance()
-        if math.isfinite(slope):
-            there = min(max((pressure_pa - offset_pa) / slope / self.stroke_m, 0.0), 1.0)
+        if math.isfinite(self._balance()[0]):
+            there = self._rests(pressure_pa)
             lines.append(
                 f"By what is identified the stem comes to about {self._position(there)}, give or take friction."
             )
@@ -104,17 +104,24 @@ class Ahead:
         shown = self.units.pressure.text
         about = shown(alpha_pa) if alpha_pa > 0 else "what keeps the stem where it is"
         yield f"The pressure swings by ±{shown(beta_pa)} about {about}, {2 * math.pi / omega:.3g} s a period."
-        slope, offset_pa = self._balance()
+        slope, _ = self._balance()
         if not math.isfinite(slope):
             yield "How far the stem goes is not known before the valve is identified."
         elif alpha_pa > 0:
-            ends = ((alpha_pa + sign * beta_pa - offset_pa) / slope / self.stroke_m for sign in (-1, 1))
-            low, high = (self._position(min(max(each, 0.0), 1.0)) for each in ends)
+            ends = sorted(self._rests(alpha_pa + sign * beta_pa) for sign in (-1, 1))
+            low, high = map(self._position, ends)
             yield f"The stem stands at {self.stands}, and goes into the range from {low} to {high}."
         else:
             most = beta_pa / slope / self.stroke_m
             yield f"The stem goes at most ±{most:.1%} of its stroke{self._length(most)} about {self.stands}."
         yield f"How long: until friction and spring are identified, at most {limit_s:g} s."
+
+    def _rests(self, pressure_pa: float) -> float:
+        """Return the opening at which spring and pressure balance."""
+        slope, offset_pa = self._balance()
+        closes = self.settings is not None and self.settings.valve.travel.closes
+        opening = Travel(self.stroke_m, closes).opening((pressure_pa - offset_pa) / slope)
+        return min(max(opening, 0.0), 1.0)
 
     def _balance(self) -> tuple[float, float]:
         """Return the pressure that balances the spring, Pa/m, and its offset, Pa; NaN before they are identified."""

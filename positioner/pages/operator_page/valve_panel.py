@@ -157,7 +157,9 @@ class ValvePanel:
 
     async def _work_out(self) -> None:
         view, folder = self.valve.view, self.valve.place.recordings
-        moves = await aside(last_moves, view, time.monotonic(), MOVES_S, folder, time.time())
+        settings = self.valve.place.settings
+        travel = None if settings is None else settings.valve.travel
+        moves = await aside(last_moves, view, time.monotonic(), MOVES_S, folder, time.time(), travel)
         self._moves_said.set_content(_told(moves))
         if moves is not None:
             self._recorded.show(moves.recording, self.valve.view.stroke_m)

@@ -11,6 +11,7 @@ from config.daemon_file import DaemonFile, HealthTable
 from config.registers import BY_NAME
 from config.slave_file import SlaveFile
 from config.supervision_table import SupervisionTable
+from config.travel import Travel
 from config.valve_file import load_valve, shipped_valve
 from fieldbus.modbus.register_answers import RegisterError
 from positioner.control.controller_memory import Decision
@@ -45,7 +46,7 @@ class Panel:
         slave = {"clock": {"mode": "lockstep"}, "initial": rest, "sensor": {"noise_std_m": NOISE_M}, "change": change}
         device = device_of(SlaveFile.model_validate(slave), shipped_valve("seed"))
         self.cycle = virtual_cycle(DaemonFile.model_validate(tables), device, Requests(alpha_pa=70e3, beta_pa=13238.0))
-        self.registers = SupervisoryRegisters(self.cycle, STROKE_M, 0.0, 420e3)
+        self.registers = SupervisoryRegisters(self.cycle, Travel(STROKE_M), 0.0, 420e3)
         assert self.cycle.health is not None
         self.health = self.cycle.health
 
