@@ -1,15 +1,16 @@
-"""Runs a page of commands and code as a person would and writes it with what they printed and drew.
+"""Runs the commands and code of a page as a person would, and puts after each what it printed and drew.
 
-    python docs/notebook.py docs/tutorial/source.md docs/tutorial.md
+    python docs/notebook.py docs/tutorial.md
 
-The source is Markdown. Everything happens in one folder that goes away afterwards, block by block:
+The page is Markdown, and its own source: what stands after its blocks is written anew. Everything happens in one folder
+that goes away afterwards, block by block:
 
     ```toml NAME      a file to be written there
     ```sh             commands, one a line or continued by a backslash; one that ends in & goes on until the page ends
     ```python         code; all blocks share their names, and a figure saved as *.png follows the block that saved it
 
-Output but for progress follows its block, with an exit status of 1 (what was asked about does not hold); anything worse
-ends the run. Nothing else of the source is changed.
+Output but for progress follows its block as ```text, with an exit status of 1 (what was asked about does not hold);
+anything worse ends the run. Nothing else of the page is changed.
 """
 
 import io
@@ -24,7 +25,12 @@ from contextlib import ExitStack, chdir, contextmanager, redirect_stdout
 from pathlib import Path
 from typing import Any
 
-BLOCK = re.compile(r"^```(?P<kind>toml|sh|python)(?: (?P<name>\S+))?\n(?P<text>.*?)^```\n", re.MULTILINE | re.DOTALL)
+BLOCK = re.compile(
+    r"^(?P<block>```(?P<kind>toml|sh|python)(?: (?P<name>\S+))?\n(?P<text>.*?)^```\n)"
+    r"(?P<shown>\n```text\n.*?^```\n)?(?P<figures>(?:\n!\[[^\]\n]*\]\(img/[\w.-]+\)\n)*)",
+    re.MULTILINE | re.DOTALL,
+)
+"""A block, and what it printed and drew when the page was run last."""
 PROGRESS = re.compile(r"^.*(?:: \d+%|, \d+ s so far)\n", re.MULTILINE)
 """What a command says while it works, which is another line each time."""
 HOLDS_NOT = 1
@@ -44,11 +50,12 @@ class Notebook:
         """Run a block; return it with what comes after it on the page."""
         kind, text = block["kind"], block["text"]
         if kind == "toml":
-            Path(block["name"]).write_text(text, encoding="utf-8")
+            if block["name"]:
+                Path(block["name"]).write_text(text, encoding="utf-8")
             return block[0]
         printed = "".join(map(self._command, _commands(text))) if kind == "sh" else self._code(text)
         shown = f"\n```text\n{printed.rstrip()}\n```\n" if printed.strip() else ""
-        return block[0] + shown + "".join(self._figures())
+        return block["block"] + shown + "".join(self._figures())
 
     def _command(self, command: str) -> str:
         print(f"$ {command}", file=sys.stderr, flush=True)
@@ -104,17 +111,17 @@ def _going_on(command: str) -> Iterator[str]:
             process.stdout.close()
 
 
-def run(source: Path, target: Path) -> None:
-    """Run a source and write its page, the figures into `img` beside it."""
-    text, target = source.read_text(encoding="utf-8"), target.resolve()
-    images = target.parent / "img"
+def run(page: Path) -> None:
+    """Run a page and write it anew, its figures into `img` beside it."""
+    page = page.resolve()
+    text = page.read_text(encoding="utf-8")
     with tempfile.TemporaryDirectory() as folder, chdir(folder), ExitStack() as processes:
-        notebook = Notebook(images, target.stem, processes)
-        page = BLOCK.sub(notebook.after, text)
-    made = f"<!-- Made by `make docs` from {source.parent.name}/{source.name}: edit that. -->\n\n"
-    target.write_text(made + page, encoding="utf-8")
+        notebook = Notebook(page.parent / "img", page.stem, processes)
+        text = BLOCK.sub(notebook.after, text)
+    page.write_text(text, encoding="utf-8")
 
 
 if __name__ == "__main__":
     os.environ["MPLBACKEND"] = "Agg"
-    run(Path(sys.argv[1]), Path(sys.argv[2]))
+    for name in sys.argv[1:]:
+        run(Path(name))

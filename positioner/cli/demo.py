@@ -1,9 +1,13 @@
-"""`positioner demo`: a sticking valve identified and controlled over a real bus, in under a minute.
+"""`positioner demo`: a sticking valve identified and controlled over a real bus, by two laws, in under a minute.
 
-A simulated slave and the daemon run as processes of their own, on the bus that `--bus` names
-(`parts.simulated_plant`); this command plays the DCS over Modbus TCP: start, identification, steps up and down, ageing
-of the packing by 30 %, the same steps once more, identification anew, and the steps again. What the daemon identified
-is compared with the truth here, where it is known; the daemon never has it.
+A simulated valve runs as a process on the bus that `--bus` names (`parts.simulated_plant`). Two daemons drive it, one
+after the other, and this command plays the DCS over Modbus TCP:
+
+    the paper's law   identification by a sine, steps up and down; the packing ages by 30 %; the steps again,
+                      identification anew, the steps, and small steps, which this law cannot make
+    slides            a new daemon with a cycle of 10 ms: identification by slides, two steps, the small steps
+
+What a daemon identified is compared with the truth here, where it is known; no daemon ever has it.
 
 `--hidden` gives the valve an effect that nobody has told the daemon, finds it in the daemon's own recording, gives the
 daemon the extended valve and makes the same steps again (`parts.hidden_demo`).
@@ -17,22 +21,32 @@ import shlex
 import shutil
 import sys
 import time
-from collections.abc import Iterator
+from collections.abc import Iterator, Sequence
 from contextlib import contextmanager
-from dataclasses import asdict, dataclass
+from dataclasses import asdict, dataclass, replace
+from itertools import pairwise
 from pathlib import Path
 from typing import TYPE_CHECKING
 
 from positioner.cli.parts.demo_folder import demo_folder, recording_in
 from positioner.cli.parts.output_files import writable, write_json
 from positioner.cli.parts.passing_line import passing
-from positioner.cli.parts.simulated_plant import AGEING, AGES_AT_S, BUSES, started
+from positioner.cli.parts.simulated_plant import (
+    AGEING,
+    AGES_AT_S,
+    BUSES,
+    RECORDER,
+    THE_PAPERS_LAW,
+    ageing,
+    daemon_running,
+    slave_running,
+)
 
 if TYPE_CHECKING:
     from config.valve_file import ValveParameters
     from positioner.dcs import Dcs
 
-HELP = "identify and control a simulated sticking valve over a real bus, in under a minute; or its flow loop"
+HELP = "identify and position a simulated sticking valve over a real bus, by two laws, in under a minute"
 EXAMPLE = "positioner demo --out demo-out"
 
 PSI = 6894.757
@@ -42,7 +56,16 @@ AGED_ALPHA_PA = 11.5 * PSI
 """Enough for the aged packing to break away from where the stem is then."""
 STEPS = (0.65, 0.40, 0.80, 0.50, 0.40)
 """This valve's spring has no preload: without pressure it pulls the stem down only to F_c / k_s, 0.27 to 0.35 p.u."""
+SLIDES_STEPS = (0.65, 0.40)
+SMALL_STEPS = (0.41, 0.405, 0.43)
+"""All below the 5.3 % of stroke from which on the paper's law moves this stem; after the last of `STEPS`."""
 STEP_S = 0.5
+SLIDES_STEP_S = 1.5
+"""Slides leave small errors alone while references change within 1.2 s of each other."""
+SLIDES_PERIOD_S = 10e-3
+"""Of the second daemon's cycle: as gateways poll; slides do not hang on the period."""
+SLIDES_RECORDER = '[recorder]\nfolder = "slides"\n'
+STAIRCASE_WITHIN_S = 60.0
 SETTLED_S = 0.2
 """The error of a step is the mean over this last part of it."""
 IDENTIFICATIONS = 3
@@ -51,9 +74,22 @@ ACKNOWLEDGEMENTS = 10
 """At most at the start, half a second apart: on a machine that is that busy replies are lost for seconds."""
 NEW = "new"
 """The phase before the packing ages."""
+SMALL = "small steps"
+"""The phase of steps that the paper's law cannot make."""
+SLIDES = "slides"
+"""The phase under the law of slides."""
 LARGEST_ERROR_PU = 0.01
+"""By the paper."""
+LARGEST_SLIDES_ERROR_PU = 0.001
 LARGEST_RATIO_ERROR = 0.01
-RATIOS = ("b_over_c", "k_over_c")
+COUNTS = {
+    "missed periods": "missed_periods",
+    "samples of the device that no cycle looked at": "lost_samples",
+    "lost replies": "lost_replies",
+    "not recorded": "unrecorded",
+}
+RATIOS = ("b_over_c", "k_over_c", "static_slope", "static_up", "static_down")
+"""What a law needs."""
 PROGRAM = "positioner"
 
 
@@ -64,7 +100,8 @@ class StepOutcome:
     phase: str
     reference_pu: float
     error_pu: float
-    counted: bool
+    limit_pu: float | None
+    """Of the error; None: the law is not held to it here."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -90,7 +127,8 @@ class DemoOutcome:
 
     steps: list[StepOutcome]
     identified: list[ComparedEstimate]
-    cycle: dict[str, float]
+    cycles: dict[str, dict[str, float]]
+    """Statistics of each daemon's cycle, by its law."""
 
     @property
     def problems(self) -> list[str]:
@@ -99,7 +137,7 @@ class DemoOutcome:
             [
                 f"step to {step.reference_pu:g} p.u. ({step.phase}) ended {step.error_pu:+.4f} p.u. off"
                 for step in self.steps
-                if step.counted and not abs(step.error_pu) <= LARGEST_ERROR_PU
+                if step.limit_pu is not None and not abs(step.error_pu) <= step.limit_pu
             ]
             + [
                 f"{each.name} ({each.phase}): {_percent(each.deviation)} off the truth"
@@ -110,7 +148,7 @@ class DemoOutcome:
                 f"the packing aged before the step to {step.reference_pu:g} p.u. ({step.phase}) was over: the "
                 "machine is too busy for the demo's times, run it again"
                 for step in self.steps
-                if step.phase == NEW and not step.counted
+                if step.phase == NEW and step.limit_pu is None
             ][:1]
         )
 
@@ -146,22 +184,19 @@ def run(arguments: argparse.Namespace) -> int:
 def _run_steps(arguments: argparse.Namespace) -> int:
 
     from config.valve_file import load_valve, shipped_valve
-    from positioner.cli.parts.children import port_in
 
     valve = load_valve(shipped_valve("seed")).valve
     with _folder(arguments.out) as folder:
         started_s = time.monotonic()
-        _print_line("starting a simulated valve and the daemon")
-        with started(arguments.bus or "modbus", folder, valve) as pair:
-            _print_line(f"slave {pair.slave}; daemon {pair.daemon}")
-            outcome = _play(port_in(pair.daemon), valve, pair.powered_s)
+        outcome = _both_laws(arguments.bus or "modbus", folder, valve)
         _report(outcome)
         picture = _picture(folder, outcome)
         if arguments.out:
-            _print_line(f"picture {picture}, recording {_recording(folder)}")
+            _print_line(f"picture {picture}, recordings {_recording(folder)}, {_recording(folder, SLIDES)}")
             print("in a browser:", *_in_a_browser(_recording(folder)), sep="\n  ")
         if arguments.json:
             write_json(arguments.json, _jsonable(outcome, time.monotonic() - started_s), indent=1)
+        print(_summary(outcome))
         for problem in outcome.problems:
             print(f"DOES NOT HOLD: {problem}")
         print(f"{'all holds' if not outcome.problems else 'failed'}, {time.monotonic() - started_s:.0f} s")
@@ -181,24 +216,72 @@ def _folder(asked: Path | None) -> Iterator[Path]:
         yield asked
 
 
-def _play(port: int, valve: "ValveParameters", powered_s: float) -> DemoOutcome:
-    """Be the DCS."""
-    from config.registers import STATISTICS
+def _both_laws(bus: str, folder: Path, valve: "ValveParameters") -> DemoOutcome:
+    """Run the valve, and on it a daemon for each law."""
+    from positioner.cli.parts.children import port_in
+
+    _print_line("starting a simulated valve and the daemon")
+    with slave_running(bus, folder, "seed", ageing(valve)) as (setup, slave):
+        powered_s = time.monotonic()
+        with daemon_running(folder / "daemon.toml", setup, slave, RECORDER + THE_PAPERS_LAW) as daemon:
+            _print_line(f"slave {slave}; daemon {daemon}; the paper's law")
+            paper = _play_paper(port_in(daemon), valve, powered_s)
+        slower = replace(setup, period_s=SLIDES_PERIOD_S)
+        with daemon_running(folder / "slides.toml", slower, slave, SLIDES_RECORDER) as daemon:
+            _print_line(f"the same valve; another daemon {daemon}; slides, the default law")
+            slides = _play_slides(port_in(daemon), _aged(valve))
+    return DemoOutcome(
+        paper.steps + slides.steps, paper.identified + slides.identified, {**paper.cycles, **slides.cycles}
+    )
+
+
+def _aged(valve: "ValveParameters") -> "ValveParameters":
+    return valve.model_copy(update={"coulomb_n": AGEING * valve.coulomb_n, "static_n": AGEING * valve.static_n})
+
+
+def _play_paper(port: int, valve: "ValveParameters", powered_s: float) -> DemoOutcome:
+    """Be the DCS of the paper's law."""
     from positioner.dcs import Dcs
 
-    aged = valve.model_copy(update={"coulomb_n": AGEING * valve.coulomb_n, "static_n": AGEING * valve.static_n})
     with Dcs("127.0.0.1", port) as dcs:
-        _observe(dcs, 0.5, "S0, nothing moves")
-        _acknowledge(dcs)
-        dcs.set("mode", 2)
+        _begin(dcs)
         identified = identify(dcs, NEW, ALPHA_PA, valve)
-        steps = _steps(dcs, NEW, counted_until_s=powered_s + AGES_AT_S)
+        steps = _steps(dcs, NEW, STEPS, limit_pu=LARGEST_ERROR_PU, until_s=powered_s + AGES_AT_S)
         _observe(dcs, AGES_AT_S + 0.5 - (time.monotonic() - powered_s), "the packing ages by 30 %")
-        steps += _steps(dcs, "aged", counted_until_s=-math.inf)
-        identified += identify(dcs, "aged", AGED_ALPHA_PA, aged)
-        steps += _steps(dcs, "identified anew")
-        cycle = dcs.get_all(*(register.name for register in STATISTICS))
-    return DemoOutcome(steps, identified, cycle)
+        steps += _steps(dcs, "aged", STEPS, limit_pu=None)
+        identified += identify(dcs, "aged", AGED_ALPHA_PA, _aged(valve))
+        steps += _steps(dcs, "identified anew", STEPS, limit_pu=LARGEST_ERROR_PU)
+        steps += _steps(dcs, SMALL, SMALL_STEPS, limit_pu=None)
+        return DemoOutcome(steps, identified, {"paper": _statistics(dcs)})
+
+
+def _play_slides(port: int, valve: "ValveParameters") -> DemoOutcome:
+    """Be the DCS of the law of slides."""
+    from positioner.dcs import Dcs
+    from positioner.virtual.true_parameters import truth
+
+    true = truth(valve)
+    true = {"static_slope": -true["b_over_c"], "static_up": -true["k_over_c"], "static_down": -true["k_over_c"]}
+    with Dcs("127.0.0.1", port) as dcs:
+        _begin(dcs)
+        identified = _identify(dcs, SLIDES, {}, STAIRCASE_WITHIN_S, true)
+        steps = _steps(
+            dcs, SLIDES, (*SLIDES_STEPS, *SMALL_STEPS), limit_pu=LARGEST_SLIDES_ERROR_PU, step_s=SLIDES_STEP_S
+        )
+        return DemoOutcome(steps, identified, {SLIDES: _statistics(dcs)})
+
+
+def _begin(dcs: "Dcs") -> None:
+    """Look on while nothing moves; then choose automatic."""
+    _observe(dcs, 0.5, "S0, nothing moves")
+    _acknowledge(dcs)
+    dcs.set("mode", 2)
+
+
+def _statistics(dcs: "Dcs") -> dict[str, float]:
+    from config.registers import STATISTICS
+
+    return dcs.get_all(*(register.name for register in STATISTICS))
 
 
 def _acknowledge(dcs: "Dcs") -> None:
@@ -214,18 +297,24 @@ def _acknowledge(dcs: "Dcs") -> None:
 
 
 def identify(dcs: "Dcs", phase: str, alpha_pa: float, valve: "ValveParameters") -> list[ComparedEstimate]:
-    """Have the valve identified, anew where that is refused; return what was identified against the truth."""
+    """Have the valve identified by a sine, anew where that is refused; return what was found against the truth."""
     from positioner.virtual.true_parameters import truth
 
+    return _identify(dcs, phase, {"alpha": alpha_pa, "beta": BETA_PA, "omega": 1.0}, 5.0, truth(valve))
+
+
+def _identify(
+    dcs: "Dcs", phase: str, excitation: dict[str, float], within_s: float, true: dict[str, float]
+) -> list[ComparedEstimate]:
     def show(progress: float) -> None:
         _show_passing(f"identifying ({phase}): {100 * progress:3.0f} %")
 
     for _ in range(IDENTIFICATIONS):
-        problem = dcs.identify({"alpha": alpha_pa, "beta": BETA_PA, "omega": 1.0}, 5.0, show)
+        problem = dcs.identify(excitation, within_s, show)
         _print_line(f"identified ({phase})" if problem is None else f"identification ({phase}) failed: {problem}")
         if problem is None:
             break
-    return [_compared(dcs, phase, name, true) for name, true in truth(valve).items()]
+    return [_compared(dcs, phase, name, value) for name, value in true.items()]
 
 
 def _compared(dcs: "Dcs", phase: str, name: str, true: float) -> ComparedEstimate:
@@ -237,16 +326,24 @@ def _compared(dcs: "Dcs", phase: str, name: str, true: float) -> ComparedEstimat
     return ComparedEstimate(phase, name, now[f"{name}_e"], now[f"{name}_std"], true, refusal)
 
 
-def _steps(dcs: "Dcs", phase: str, counted_until_s: float = math.inf) -> list[StepOutcome]:
+def _steps(
+    dcs: "Dcs",
+    phase: str,
+    references_pu: Sequence[float],
+    *,
+    limit_pu: float | None,
+    until_s: float = math.inf,
+    step_s: float = STEP_S,
+) -> list[StepOutcome]:
     """Make the steps; what is over after the packing has aged does not count for the packing that was identified."""
     steps = []
-    for reference_pu in STEPS:
+    for reference_pu in references_pu:
         dcs.set("reference", reference_pu)
         label = f"{phase}: step to {reference_pu:g} p.u."
-        _observe(dcs, STEP_S - SETTLED_S, label)
+        _observe(dcs, step_s - SETTLED_S, label)
         settled_pu = _observe(dcs, SETTLED_S, label)
-        counted = time.monotonic() < counted_until_s
-        steps.append(StepOutcome(phase, reference_pu, settled_pu - reference_pu, counted))
+        limit_now_pu = limit_pu if time.monotonic() < until_s else None
+        steps.append(StepOutcome(phase, reference_pu, settled_pu - reference_pu, limit_now_pu))
     _print_line(f"{phase}: {len(steps)} steps, worst {max(abs(step.error_pu) for step in steps):.4f} p.u.")
     return steps
 
@@ -305,27 +402,41 @@ def _report(outcome: DemoOutcome) -> None:
         print(f"  refused ({', '.join(dict.fromkeys(names))}): {refusal}")
     print(f"\n{'':17}{'reference':>10}{'final error, p.u.':>20}")
     for step in outcome.steps:
-        limit = f"  (limit {LARGEST_ERROR_PU:g})" if step.counted else "  (not counted: the packing has aged)"
-        print(f"{step.phase:17}{step.reference_pu:10.2f}{step.error_pu:+20.5f}{limit}")
-    cycle = outcome.cycle
-    print(
-        f"\ncycle: {cycle['cycles']:.0f} run, median period {1e3 * cycle['period']:.3f} ms, "
-        f"99 % within {1e6 * cycle['jitter_99']:.0f} us of it, {1e6 * cycle['cycle_time']:.0f} us each"
+        limit = "(no limit)" if step.limit_pu is None else f"(limit {step.limit_pu:g})"
+        print(f"{step.phase:17}{step.reference_pu:10.3f}{step.error_pu:+20.5f}  {limit}")
+    print()
+    for law, cycle in outcome.cycles.items():
+        counts = ", ".join(f"{said} {cycle[name]:.0f}" for said, name in COUNTS.items())
+        print(
+            f"{law}: {cycle['cycles']:.0f} cycles, median period {1e3 * cycle['period']:.3f} ms, 99 % within "
+            f"{1e6 * cycle['jitter_99']:.0f} us of it, {1e6 * cycle['cycle_time']:.0f} us each; {counts}"
+        )
+
+
+def _summary(outcome: DemoOutcome) -> str:
+    """Return what the two laws leave of the same small steps."""
+    small = [step.error_pu for step in outcome.steps if step.phase == SMALL]
+    slides = [step.error_pu for step in outcome.steps if step.phase == SLIDES][-len(SMALL_STEPS) :]
+    return (
+        f"small steps of {_sizes()} % of stroke, worst error: "
+        f"the paper's law {100 * _worst(small):.2f} %, slides {100 * _worst(slides):.3f} %"
     )
-    counts = {
-        "missed periods": "missed_periods",
-        "samples of the device that no cycle looked at": "lost_samples",
-        "lost replies": "lost_replies",
-        "not recorded": "unrecorded",
-    }
-    print(", ".join(f"{said} {cycle[name]:.0f}" for said, name in counts.items()))
+
+
+def _sizes() -> str:
+    changes = [abs(now - then) for then, now in pairwise((STEPS[-1], *SMALL_STEPS))]
+    return ", ".join(f"{100 * change:.1f}" for change in changes)
+
+
+def _worst(errors_pu: Sequence[float]) -> float:
+    return max(map(abs, errors_pu))
 
 
 def _jsonable(outcome: DemoOutcome, seconds: float) -> dict[str, object]:
     return {
         "steps": outcome.steps,
         "identified": [{**asdict(each), "deviation": each.deviation} for each in outcome.identified],
-        "cycle": outcome.cycle,
+        "cycles": outcome.cycles,
         "problems": outcome.problems,
         "seconds": seconds,
     }
@@ -350,20 +461,26 @@ def _as_called() -> str:
     return str(called) if called.name == PROGRAM and shutil.which(PROGRAM) is None else PROGRAM
 
 
-def _recording(folder: Path) -> Path:
-    return recording_in(folder / "recordings")
+def _recording(folder: Path, of: str = "recordings") -> Path:
+    return recording_in(folder / of)
 
 
 def _picture(folder: Path, outcome: DemoOutcome) -> Path:
     from config.recording import read_recording
     from config.valve_file import load_valve, shipped_valve
-    from positioner.virtual.run_picture import draw_run
+    from positioner.virtual.run_picture import draw_runs
 
     path = folder / "run.png"
-    stroke_m = load_valve(shipped_valve("seed")).valve.stroke_m
-    errors = ", ".join(
-        f"{phase} {max(abs(step.error_pu) for step in outcome.steps if step.phase == phase):.4f}"
+    worst = {
+        phase: f"{phase} {_worst([step.error_pu for step in outcome.steps if step.phase == phase]):.4f}"
         for phase in dict.fromkeys(step.phase for step in outcome.steps)
-    )
-    draw_run(path, read_recording(_recording(folder)), stroke_m, f"worst final error, p.u. of stroke: {errors}")
+    }
+    slides = worst.pop(SLIDES)
+    runs = {
+        f"the paper's law; worst error, p.u. of stroke:\n{', '.join(worst.values())}": read_recording(
+            _recording(folder)
+        ),
+        f"slides, the default law; worst error:\n{slides}": read_recording(_recording(folder, SLIDES)),
+    }
+    draw_runs(path, runs, load_valve(shipped_valve("seed")).valve.stroke_m)
     return path

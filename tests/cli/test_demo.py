@@ -2,6 +2,7 @@
 
 import json
 import shlex
+from collections import Counter
 from pathlib import Path
 
 import pytest
@@ -24,7 +25,7 @@ from positioner.cli.main import main
 from positioner.cli.parts import simulated_plant
 from positioner.cli.parts.children import port_in
 from positioner.cli.parts.demo_folder import demo_folder, recording_in
-from positioner.cli.parts.simulated_plant import SLAVE_HEAD, started
+from positioner.cli.parts.simulated_plant import SLAVE_HEAD, daemon_running, slave_running
 from positioner.dcs import Dcs
 from tests.children import running
 from tests.cli.test_daemon_process import until
@@ -32,9 +33,11 @@ from tests.cli.test_daemon_process import until
 pytestmark = pytest.mark.real_time
 
 
-def outcome(error_pu: float = 0.001, ratio: float = 1.0, *, phase: str = "new", counted: bool = True) -> DemoOutcome:
+def outcome(
+    error_pu: float = 0.001, ratio: float = 1.0, *, phase: str = "new", limit_pu: float | None = LARGEST_ERROR_PU
+) -> DemoOutcome:
     identified = [ComparedEstimate("new", "b_over_c", -800e3 * ratio, 1.0, -800e3, "")]
-    return DemoOutcome([StepOutcome(phase, 0.5, error_pu, counted)], identified, {})
+    return DemoOutcome([StepOutcome(phase, 0.5, error_pu, limit_pu)], identified, {})
 
 
 @pytest.mark.parametrize(
@@ -43,8 +46,8 @@ def outcome(error_pu: float = 0.001, ratio: float = 1.0, *, phase: str = "new", 
         (outcome(), True),
         (outcome(error_pu=-1.01 * LARGEST_ERROR_PU), False),
         (outcome(error_pu=float("nan")), False),
-        (outcome(error_pu=0.08, phase="aged", counted=False), True),
-        (outcome(error_pu=0.08, counted=False), False),
+        (outcome(error_pu=0.08, phase="aged", limit_pu=None), True),
+        (outcome(error_pu=0.08, limit_pu=None), False),
         (outcome(ratio=1.011), False),
         (outcome(ratio=0.991), True),
         (outcome(ratio=float("nan")), False),
@@ -54,18 +57,30 @@ def test_what_does_not_hold_is_a_problem(result: DemoOutcome, holds: bool) -> No
     assert (not result.problems) == holds
 
 
-def test_it_ends_within_a_minute_and_leaves_picture_recording_and_figures(
+def test_it_ends_soon_and_leaves_picture_recording_and_figures(
     tmp_path: Path, capsys: pytest.CaptureFixture[str]
 ) -> None:
     status = main(["demo", "--out", str(tmp_path / "out"), "--json", str(tmp_path / "out.json")])
     told = json.loads((tmp_path / "out.json").read_text())
     assert status == (1 if told["problems"] else 0), capsys.readouterr().out
-    assert told["seconds"] < 60
-    assert [step["phase"] for step in told["steps"]] == ["new"] * 5 + ["aged"] * 5 + ["identified anew"] * 5
-    assert {each["name"] for each in told["identified"]} == {"a", "b", "c", "k", "b_over_c", "k_over_c"}
+    assert told["seconds"] < 120
+    phases = {"new": 5, "aged": 5, "identified anew": 5, "small steps": 3, "slides": 5}
+    assert Counter(step["phase"] for step in told["steps"]) == phases
+    by_phase = {phase: [each["name"] for each in told["identified"] if each["phase"] == phase] for phase in phases}
+    paper = ["a", "b", "c", "k", "b_over_c", "k_over_c"]
+    assert by_phase == {
+        "new": paper,
+        "aged": paper,
+        "identified anew": [],
+        "small steps": [],
+        "slides": ["static_slope", "static_up", "static_down"],
+    }
+    assert set(told["cycles"]) == {"paper", "slides"}
     assert (tmp_path / "out" / "run.png").read_bytes().startswith(b"\x89PNG")
     (recording,) = (tmp_path / "out" / "recordings").glob("*.csv")
-    identified = any(not each["refusal"] for each in told["identified"])
+    (slides,) = (tmp_path / "out" / "slides").glob("*.csv")
+    assert read_recording(slides).columns["state"].max() == 3.0
+    identified = any(not each["refusal"] for each in told["identified"] if each["phase"] == "new")
     states = set(read_recording(recording).columns["state"].tolist())
     assert states == ({0.0, 1.0, 2.0, 3.0} if identified else {0.0, 3.0}), "what is refused moves no stem"
 
@@ -130,7 +145,7 @@ def test_what_it_says_to_type_next_is_found_from_where_it_was_typed(
 
 def test_steps_that_come_after_the_ageing_are_said_to_be_late_and_not_to_be_off() -> None:
     """A valve that was 0.08 off, for its packing had aged while the processes were started, was said not to hold."""
-    (problem,) = outcome(error_pu=0.08, counted=False).problems
+    (problem,) = outcome(error_pu=0.08, limit_pu=None).problems
     assert problem.startswith("the packing aged before the step to 0.5 p.u. (new) was over: the machine is too busy")
 
 
@@ -194,9 +209,12 @@ def test_on_the_other_buses_the_same_files_bring_up_a_valve_that_obeys(
 ) -> None:
     """What the command does on every bus alike, starting both from nothing, is shown by the test above."""
     monkeypatch.setattr(simulated_plant, "running", running)
-    with started(bus, tmp_path, load_valve(shipped_valve("seed")).valve) as pair:
-        assert pair.slave.startswith(where)
-        with Dcs("127.0.0.1", port_in(pair.daemon)) as dcs:
+    with (
+        slave_running(bus, tmp_path, "seed") as (setup, slave),
+        daemon_running(tmp_path / "daemon.toml", setup, slave) as daemon,
+    ):
+        assert slave.startswith(where)
+        with Dcs("127.0.0.1", port_in(daemon)) as dcs:
             assert dcs.get_all("fault", "position_m") == pytest.approx({"fault": Fault.NONE, "position_m": 0}, abs=1e-3)
             dcs.set_all({"mode": Mode.MANUAL, "manual_pressure": 60e3})
             until(lambda: dcs.get("position") > 0.3, "the stem's motion")

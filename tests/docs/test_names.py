@@ -195,9 +195,8 @@ def test_every_command_line_can_be_parsed(document: Path) -> None:
 
 @each_document
 def test_every_link_leads_somewhere(document: Path) -> None:
-    folder = ROOT / "docs" if document.parent.name == "tutorial" else document.parent  # a source's page stands there
     for target in LINK.findall(FENCED.sub("", document.read_text(encoding="utf-8"))):
-        assert "://" in target or (folder / target).exists(), target
+        assert "://" in target or (document.parent / target).exists(), target
 
 
 def test_each_decision_has_its_number_and_names_others_that_exist() -> None:

@@ -18,6 +18,8 @@ LEFT = (
     "slave.toml",
     "daemon.toml",
     "recordings",
+    "slides.toml",
+    "slides",
     "run.png",
     "hidden.toml",
     "before.toml",

@@ -1,9 +1,8 @@
-"""A simulated slave and the daemon as processes on a bus, with the files that both are given: what `demo` runs on.
+"""A simulated slave and a daemon as processes on a bus, with the files that both are given: what `demo` runs on.
 
-The packing of the simulated valve ages by `AGEING` at `AGES_AT_S` after power-up.
+The packing of a valve with `ageing` ages by `AGEING` at `AGES_AT_S` after power-up.
 """
 
-import time
 from collections.abc import Callable, Iterator
 from contextlib import AbstractContextManager, contextmanager
 from dataclasses import dataclass
@@ -28,6 +27,7 @@ RTU_WINDOW_S = 1.2
 STROKE_M = 0.1016
 """Of the seed's valve."""
 RECORDER = '[recorder]\nfolder = "recordings"\n'
+THE_PAPERS_LAW = '[control]\nlaw = "seed"\n'
 SLAVE_HEAD = "# The simulated valve of the demo.\n"
 """Begins the slave's file: by it a demo knows what another has left."""
 NOISE_PU = 1e-4
@@ -73,27 +73,6 @@ def _rtu() -> Iterator[BusSetup]:
 
 BUSES: dict[str, Callable[[], AbstractContextManager[BusSetup]]] = {"modbus": _modbus, "canopen": _canopen, "rtu": _rtu}
 """The buses, by the name that `--bus` gives them."""
-
-
-@dataclass(frozen=True, slots=True)
-class RunningPair:
-    """A slave and a daemon that run: what each says, and when the slave was powered up."""
-
-    slave: str
-    daemon: str
-    powered_s: float
-
-
-THE_PAPERS_LAW = '[control]\nlaw = "seed"\n'
-
-
-@contextmanager
-def started(bus: str, folder: Path, valve: "ValveParameters") -> Iterator[RunningPair]:
-    """Run a slave and a daemon on a bus as processes, their files and logs in a folder."""
-    with slave_running(bus, folder, "seed", _ageing(valve)) as (setup, slave):
-        powered_s = time.monotonic()
-        with daemon_running(folder / "daemon.toml", setup, slave, RECORDER + THE_PAPERS_LAW) as daemon:
-            yield RunningPair(slave, daemon, powered_s)
 
 
 @contextmanager
@@ -146,7 +125,8 @@ seed = 1
 {tables}"""
 
 
-def _ageing(valve: "ValveParameters") -> str:
+def ageing(valve: "ValveParameters") -> str:
+    """Return the table of a slave's file by which the packing ages."""
     return f"""# Its packing ages.
 [[change]]
 at_s = {AGES_AT_S}
