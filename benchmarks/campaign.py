@@ -379,27 +379,21 @@ def _always(trial: Trial, settings: Settings) -> Iterator[str]:
 
 
 def table(outcomes: Sequence[tuple[Case, Outcome]]) -> list[str]:
-    """Return the table: a row a fault, of each bus the cases, what they ended in, and the most cycles that took."""
-    by_fault: dict[str, dict[str, list[tuple[Case, Outcome]]]] = defaultdict(lambda: defaultdict(list))
+    """Return the table: a row a fault, with its cases on all buses, what they ended in, and the most cycles to it."""
+    by_fault: dict[str, list[tuple[Case, Outcome]]] = defaultdict(list)
     for case, outcome in outcomes:
-        by_fault[case.fault.name][case.bus].append((case, outcome))
-    rows = [f"| fault | {' | '.join(BUSES)} |", f"|---|{'---|' * len(BUSES)}"]
-    rows += [
-        f"| {name} | {' | '.join(_cell(by_bus.get(bus, [])) for bus in BUSES)} |" for name, by_bus in by_fault.items()
-    ]
+        by_fault[case.fault.name].append((case, outcome))
     bad = sum(bool(outcome.violations) for _, outcome in outcomes)
-    said = f"{len(outcomes)} cases, {bad} not as documented. A cell: cases; faults they ended in; most cycles to one."
-    return [said, "", *rows]
+    head = ["| fault | cases | ends in | most cycles to it |", "|---|---|---|---|"]
+    return [f"{len(outcomes)} cases, {bad} not as documented.", "", *head, *map(_row, by_fault, by_fault.values())]
 
 
-def _cell(outcomes: Sequence[tuple[Case, Outcome]]) -> str:
-    if not outcomes:
-        return ""
+def _row(name: str, outcomes: Sequence[tuple[Case, Outcome]]) -> str:
     new = [(case, each) for case, each in outcomes if each.fault is not Fault.NONE]
     new = [(case, each) for case, each in new if case.state != "fault" or each.fault is not Fault.STALLED]
     names = sorted({each.fault.name.lower().replace("_", " ") for _, each in new}) or ["none"]
-    most = f"; {max(each.cycles for _, each in new)}" if new else ""
-    return f"{len(outcomes)}; {', '.join(names)}{most}"
+    most = max((each.cycles for _, each in new), default="")
+    return f"| {name} | {len(outcomes)} | {', '.join(names)} | {most} |"
 
 
 def _kept(path: Path) -> dict[str, Outcome]:

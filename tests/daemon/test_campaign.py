@@ -37,4 +37,4 @@ def test_a_fault_that_is_not_seen_is_told(monkeypatch: pytest.MonkeyPatch) -> No
     tolerated = replace(case, fault=replace(case.fault, ends_in=NONE))
     rows = table([(case, Outcome(Fault.NONE, 130, [said])), (tolerated, Outcome(Fault.OTHER_MASTER, 1, []))])
     assert rows[0].startswith("2 cases, 1 not as documented.")
-    assert rows[-1] == "| another master writes | 2; other master; 1 |  |  |  |"
+    assert rows[-1] == "| another master writes | 2 | other master | 1 |"
