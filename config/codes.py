@@ -164,6 +164,27 @@ class ExperimentState(Code):
     TOO_FAST = 12, "faster than the rate limit"
     TOO_LONG = 13, "longer than the time limit"
     FAULT = 14, "fault (see there)"
+    TURNED = 15, "complete: it turned at its travel and came back"
+    BEYOND_BAND = 16, "the stem went beyond the band of the experiment"
+
+
+class ValveTestVerdict(Code):
+    """What a test on the valve comes to."""
+
+    PASSED = 0, "passed"
+    FRICTION_HIGH = 1, "friction high"
+    FRICTION_LOW = 2, "friction low"
+    TRAVEL_NOT_REACHED = 3, "the least travel was not reached"
+    TRAVEL_EXCEEDED = 4, "the most travel was passed"
+    NOT_SEATED = 5, "the stem is not back where it was"
+    DEVIATION = 6, "the stem does not rest before the test: it is moved by something else"
+    PRESSURE_THRESHOLD = 7, "the pressure threshold was reached before the travel"
+    NOT_MOVED = 8, "the stem did not move"
+    NO_SUPPLY = 9, "the pressure does not follow the command: no supply, or no I/P"
+    STROKE_DIFFERS = 10, "the travel is another than the file says"
+    BROKEN_OFF = 11, "broken off"
+    UNDETERMINED = 12, "cannot be told"
+    CHANGED = 13, "figures have changed since the record it is compared with"
 
 
 class Refusal(Code):

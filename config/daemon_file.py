@@ -162,7 +162,7 @@ class ExperimentTable(Schema):
     """Table `[experiment]`: what an experiment that the DCS consents to must stay inside."""
 
     travel_window: Pair[Fraction] = (0.05, 0.95)
-    """Beyond it the experiment is broken off, as shares of the stroke."""
+    """Beyond it the experiment is broken off, as shares of the stroke; 0 and 1 are the stops themselves."""
     minimum_pa: NonNegative | None = None
     """Those of `[pressure]` where nobody says."""
     maximum_pa: Positive | None = None

@@ -289,6 +289,8 @@ EXPERIMENT = (
     Register("experiment_points", 608, "uint16", "1", "how many there are"),
     Register("experiment_state", 609, "uint16", "1", listed(ExperimentState)),
     Register("experiment_elapsed", 610, "float32", "s", "time since its first point, while it is under way"),
+    _writable("experiment_turn", 612, "float32", "m", 0.0, 1e6, "travel at which it retraces its way; 0: never"),
+    _writable("experiment_band", 614, "float32", "m", 0.0, 1e6, "travel that breaks it off; 0: the window alone does"),
 )
 
 EVENTS = (

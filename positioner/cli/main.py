@@ -24,6 +24,7 @@ COMMANDS = (
     "get",
     "set",
     "identify",
+    "signature",
     "discriminate",
     "map",
     "events",

@@ -2,22 +2,30 @@
 
     approach    from the command in force to the first pressure, at the rate limit
     play        straight from each pressure to the next; t = 0 is the end of the approach
+    turn        where the stem has gone as far as was asked: the way so far, backwards, at its own pace
     return      at the rate limit to the command that was in force before: the law, which has not moved, goes on there
+
+Travel is counted from where the stem was at the start, and by the median of the last samples: one that a noise throws
+far neither turns it nor breaks it off.
 
 It begins by a start written in automatic with the consent of the DCS, no veto, eta_1 = 1, a good measurement inside the
 travel window, and a sequence whose pressures, rates and length are inside the limits; a start that is refused does not
 come later by itself. It is broken off, by the way back, when consent is withdrawn, a veto comes or the stem leaves the
-window; at once, without a way back, by another mode, by eta_1 = 0 and by a fault, whose safe action commands.
+window or the experiment's own band; at once, without a way back, by another mode, by eta_1 = 0 and by a fault, whose
+safe action commands.
 """
 
 import math
 from dataclasses import dataclass, replace
 from itertools import pairwise
+from statistics import median
 
 from config.codes import ExperimentState, Fault, Mode
 from positioner.control.permissives import missing
 from positioner.control.requests import ExperimentRequest
 
+COUNTED = 5
+"""Samples whose median is where the stem is: two that noise throws far are outvoted."""
 COMMANDING = (ExperimentState.UNDER_WAY, ExperimentState.RETURNING)
 ROUNDING = 1e-3
 """Of the rate and the length: times and pressures come as float32."""
@@ -64,6 +72,19 @@ class PlayedExperiment:
     held_pa: float = 0.0
     after: ExperimentState = ExperimentState.COMPLETE
     """What it will have come to when it is back."""
+    turn_m: float = 0.0
+    """Travel at which it retraces its way; 0 never, or no more."""
+    band_m: float = 0.0
+    """Travel that breaks it off; 0 none."""
+    from_m: float = 0.0
+    """Where the stem was at the start."""
+    last_m: tuple[float, ...] = ()
+    """The last positions."""
+
+    @property
+    def travelled_m(self) -> float:
+        """How far the stem is from where it was at the start, m."""
+        return abs(median(self.last_m) - self.from_m) if self.last_m else 0.0
 
     @property
     def commands(self) -> bool:
@@ -102,10 +123,35 @@ def experiment_after(
     over = around.now_s - here.begin_s >= here.sequence[-1][0]
     if here.state is ExperimentState.RETURNING:
         return replace(here, state=here.after) if over else here
-    stopped = _withdrawn(request, around, limits)
+    here = _followed(here, around)
+    stopped = _withdrawn(request, around, limits) or _beyond_band(here)
     if stopped is not ExperimentState.NONE or over:
         return _returning(here, stopped, around, limits)
-    return here
+    return _retracing(here, around) if 0.0 < here.turn_m <= here.travelled_m else here
+
+
+def _followed(here: PlayedExperiment, around: Surroundings) -> PlayedExperiment:
+    """Return it with where the stem is now, if it asks how far that has gone."""
+    if around.position_m is None or not (here.turn_m or here.band_m):
+        return here
+    return replace(here, last_m=(*here.last_m[1 - COUNTED :], around.position_m))
+
+
+def _beyond_band(here: PlayedExperiment) -> ExperimentState:
+    return ExperimentState.BEYOND_BAND if 0.0 < here.band_m < here.travelled_m else ExperimentState.NONE
+
+
+def _retracing(here: PlayedExperiment, around: Surroundings) -> PlayedExperiment:
+    """Return it on the way that it has come, backwards."""
+    so_far_s = around.now_s - here.begin_s
+    passed = [(so_far_s - at_s, pressure_pa) for at_s, pressure_pa in here.sequence if at_s < so_far_s]
+    return replace(
+        here,
+        sequence=((0.0, around.command_pa), *reversed(passed)),
+        begin_s=around.now_s,
+        after=ExperimentState.TURNED,
+        turn_m=0.0,
+    )
 
 
 def _started(
@@ -122,6 +168,11 @@ def _started(
         sequence=((0.0, around.command_pa), *played),
         begin_s=around.now_s,
         held_pa=around.held_pa,
+        after=ExperimentState.COMPLETE,
+        turn_m=request.turn_m,
+        band_m=request.band_m,
+        from_m=around.position_m or 0.0,
+        last_m=(),
     )
 
 
@@ -129,7 +180,7 @@ def _returning(
     here: PlayedExperiment, stopped: ExperimentState, around: Surroundings, limits: ExperimentLimits
 ) -> PlayedExperiment:
     back = (_way_s(around.command_pa, here.held_pa, limits), here.held_pa)
-    after = stopped if stopped is not ExperimentState.NONE else ExperimentState.COMPLETE
+    after = here.after if stopped is ExperimentState.NONE else stopped
     return replace(
         here,
         state=ExperimentState.RETURNING,

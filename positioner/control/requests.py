@@ -16,12 +16,18 @@ QUIET: Eta = (1, 1, 1)
 
 @dataclass(frozen=True, slots=True)
 class ExperimentRequest:
-    """An experiment to be played: times, s, and pressures, Pa; `starts` counts, consent and veto hold while they do."""
+    """An experiment to be played: times, s, and pressures, Pa; `starts` counts, consent and veto hold while they do.
+
+    `turn_m` is the travel from where it begins at which it retraces its way, `band_m` the travel that breaks it off; 0
+    is none.
+    """
 
     points: tuple[tuple[float, float], ...] = ()
     starts: int = 0
     consented: bool = False
     vetoed: bool = False
+    turn_m: float = 0.0
+    band_m: float = 0.0
 
 
 @dataclass(frozen=True, slots=True)

@@ -154,14 +154,16 @@ def _excitation(file: DaemonFile) -> ExcitationLimits:
 
 def _experiment(file: DaemonFile) -> ExperimentLimits:
     table, pressure = file.experiment, file.pressure
-    low, high = file.valve.travel.window_m(table.travel_window)
+    low, high = table.travel_window
+    # A window that reaches an end of the travel reaches the stop there, beyond which nothing but noise is read.
+    low_m, high_m = file.valve.travel.window_m((low if low > 0.0 else -inf, high if high < 1.0 else inf))
     return ExperimentLimits(
         minimum_pa=pressure.minimum_pa if table.minimum_pa is None else max(pressure.minimum_pa, table.minimum_pa),
         maximum_pa=pressure.maximum_pa if table.maximum_pa is None else min(pressure.maximum_pa, table.maximum_pa),
         rate_pa_per_s=table.rate_limit_pa_per_s,
         longest_s=table.limit_s,
-        low_m=low,
-        high_m=high,
+        low_m=low_m,
+        high_m=high_m,
     )
 
 

@@ -24,7 +24,7 @@ from positioner.daemon.history.valve_history import ValveHistory
 from positioner.daemon.link import Link
 from positioner.daemon.logs import log_event, logging_valve
 from positioner.daemon.pacing import Pace
-from positioner.daemon.recorder import Recorder, Row
+from positioner.daemon.recorder import Row, RowSink
 from positioner.daemon.snapshot import Snapshot
 
 log = logging.getLogger(__name__)
@@ -42,7 +42,7 @@ class Cycle:
         controller: Controller,
         pace: Pace,
         requests: Requests,
-        recorder: Recorder | None,
+        recorder: RowSink | None,
         valve: str | None = None,
         health: Health | None = None,
         history: ValveHistory | None = None,

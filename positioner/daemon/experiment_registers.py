@@ -23,6 +23,8 @@ def experiment_asked(before: ExperimentRequest, values: Mapping[str, float]) -> 
         before,
         consented=bool(values.get("experiment_consent", before.consented)),
         vetoed=bool(values.get("experiment_veto", before.vetoed)),
+        turn_m=values.get("experiment_turn", before.turn_m),
+        band_m=values.get("experiment_band", before.band_m),
     )
     point = [values.get(f"experiment_{what}") for what in ("point", "time", "pressure")]
     if any(each is not None for each in point):
@@ -34,6 +36,8 @@ def experiment_asked(before: ExperimentRequest, values: Mapping[str, float]) -> 
                 ExcCodes.ILLEGAL_VALUE, f"experiment_point: the next is {len(after.points)}, or 0, got {number:g}"
             )
         after = replace(after, points=(*after.points[: int(number)], (time_s, pressure_pa)))
+        if number == 0:  # another sequence, which has a turn and a band of its own, or none
+            after = replace(after, turn_m=0.0, band_m=0.0)
     if "experiment_start" in values:
         if values["experiment_start"] != len(after.points):
             raise WriteRejected(
@@ -60,5 +64,7 @@ def experiment_getters() -> dict[str, Callable[[Snapshot, Requests], float]]:
         "experiment_start": lambda _s, _r: 0,
         "experiment_points": lambda _, r: len(r.experiment.points),
         "experiment_state": lambda s, _: s.decision.experiment.state,
+        "experiment_turn": lambda _, r: r.experiment.turn_m,
+        "experiment_band": lambda _, r: r.experiment.band_m,
         "experiment_elapsed": lambda s, _: s.decision.experiment.elapsed_s(s.sample.now_s),
     }

@@ -20,6 +20,7 @@ from collections import deque
 from datetime import UTC, datetime
 from pathlib import Path
 from threading import Event, Thread
+from typing import Protocol
 
 from config.errors import InputError
 from config.file_stem import file_stem
@@ -39,6 +40,21 @@ COLUMNS = (
     "unrecorded",
 )
 Row = tuple[float, float, float, float, float, int, int]
+
+
+class RowSink(Protocol):
+    """What takes the rows of a cycle."""
+
+    @property
+    def unrecorded(self) -> int:
+        """How many rows found no place."""
+        ...
+
+    def offer(self, row: Row) -> None:
+        """Take a row without waiting."""
+        ...
+
+
 """A row as offered: the columns without the last."""
 
 MOST_WAITING = 20_000

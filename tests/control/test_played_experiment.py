@@ -194,3 +194,53 @@ def test_what_the_law_uses_is_not_changed_by_landings_in_it(monkeypatch: pytest.
     asked(bench)
     played(bench)
     assert len(corrected) == 1, "that of the first step after it"
+
+
+RAMP = ((0.0, HELD_PA), (0.2, HELD_PA), (0.7, HELD_PA + 40e3))
+
+
+def moving_with_its_command(bench: Bench, m_per_pa: float = 1e-7, most: int = 1000) -> list[Decision]:
+    """Run until the command is given back, the stem going straight with the command."""
+    decisions = []
+    for _ in range(most):
+        decisions.append(bench.step(position_m=0.05 + m_per_pa * (bench.controller.command_pa - HELD_PA)))
+        if not decisions[-1].experiment.commands:
+            return decisions
+    raise AssertionError("it never ended")
+
+
+def test_at_its_travel_it_turns_and_retraces_its_way_at_its_own_pace() -> None:
+    bench = asked(automatic(law=None), points=RAMP, turn_m=2e-3)
+    decisions = moving_with_its_command(bench)
+    commands = [each.command_pa for each in decisions]
+    top = max(commands)
+    assert HELD_PA + 20e3 < top < HELD_PA + 24e3, "where it had gone 2 mm, and the median of five samples"
+    assert decisions[-1].experiment.state is ExperimentState.TURNED
+    steps = {round(abs(after - before)) for before, after in pairwise(commands)}
+    assert max(steps) <= 80e3 * PERIOD_S * 1.01, "the ramp's own pace, not the rate limit's"
+    peak = commands.index(top)
+    for back in range(20):
+        assert commands[peak + 1 + back] == pytest.approx(commands[peak - back], abs=2.0 * 80e3 * PERIOD_S)
+
+
+def test_beyond_its_band_it_is_broken_off() -> None:
+    decisions = moving_with_its_command(asked(automatic(law=None), points=RAMP, turn_m=5e-3, band_m=1e-3))
+    assert decisions[-1].experiment.state is ExperimentState.BEYOND_BAND
+    assert decisions[-1].command_pa == HELD_PA
+
+
+def test_a_veto_ends_it_on_its_way_back_too() -> None:
+    bench = asked(automatic(law=None), points=((0.0, HELD_PA), (10.0, HELD_PA + 40e3)), turn_m=2e-3)
+    for _ in range(700):
+        bench.step(position_m=0.05 + 1e-7 * (bench.controller.command_pa - HELD_PA))
+    asked(bench, points=RAMP, vetoed=True)
+    assert moving_with_its_command(bench, most=60)[-1].experiment.state is ExperimentState.VETOED
+
+
+@pytest.mark.parametrize(("window", "broken_off"), [((0.05, 0.95), True), ((0.0, 1.0), False)])
+def test_a_window_that_reaches_the_stops_ends_at_none_of_their_readings(
+    window: tuple[float, float], broken_off: bool
+) -> None:
+    bench = asked(automatic(law=None, experiment={"travel_window": window}))
+    states = [bench.step(position_m=each).experiment.state for each in (0.05, -0.001, STROKE_M + 0.001, 0.05)]
+    assert (ExperimentState.RETURNING in states) is broken_off

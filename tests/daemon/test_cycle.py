@@ -67,7 +67,7 @@ def run(counters: list[int | None], pace: Pace) -> tuple[list[Row], list[float]]
     device, notes = Device(counters), Notes()
     link = Link(device, pace)
     held_pa, _ = link.open()
-    cycle = Cycle(link, Controller(Settings.of(DAEMON), held_pa), pace, Requests(), notes)  # type: ignore[arg-type]
+    cycle = Cycle(link, Controller(Settings.of(DAEMON), held_pa), pace, Requests(), notes)
     for index in range(1, len(counters)):
         if index == 2:
             cycle.requests = replace(

@@ -14,6 +14,8 @@ if TYPE_CHECKING:
     from config.codes import ExperimentState
     from config.daemon_file import DaemonFile
     from positioner.dcs import Dcs
+    from positioner.tests_on_the_valve.program import Played as PlayedProgram
+    from positioner.tests_on_the_valve.program import Program
     from workbench.discriminate.discrimination import Player
     from workbench.discriminate.experiment_design import DesignedExperiment
 
@@ -32,7 +34,7 @@ def require_ready(file: "DaemonFile", arguments: argparse.Namespace) -> None:
         InputError: no recorder in the file, or its folder is not on this machine.
         CommandFailed: no daemon, another mode, no consent, a veto, or the stem elsewhere; says what to do.
     """
-    from config.codes import Mode
+    from config.codes import ExperimentState, Mode
     from config.errors import CommandFailed, InputError
 
     if file.recorder is None:
@@ -49,6 +51,8 @@ def require_ready(file: "DaemonFile", arguments: argparse.Namespace) -> None:
             raise CommandFailed("the DCS has not consented to experiments: positioner set experiment_consent 1")
         if dcs.get("experiment_veto"):
             raise CommandFailed("experiments are vetoed: positioner set experiment_veto 0")
+        if dcs.get("experiment_state") in (ExperimentState.UNDER_WAY, ExperimentState.RETURNING):
+            raise CommandFailed("an experiment is under way already: wait for its end, or break it off by a veto")
         least, most = file.experiment.travel_window
         position = float(dcs.get("position"))
         if not least <= position <= most:
@@ -56,6 +60,40 @@ def require_ready(file: "DaemonFile", arguments: argparse.Namespace) -> None:
                 f"the stem is at {position:.3g} of its stroke, outside [experiment] travel_window = "
                 f"[{least:g}, {most:g}]: move it there, by positioner set reference"
             )
+
+
+class RunningValve:
+    """The valve of a running daemon, on which the programs of tests are played.
+
+    Args:
+        file: the daemon's, with `[recorder]`.
+        arguments: of the command: `config`, `name`, `tls`.
+    """
+
+    def __init__(self, file: "DaemonFile", arguments: argparse.Namespace) -> None:
+        self._file = file
+        self._arguments = arguments
+        self._folder = _folder(file, arguments)
+
+    def command_pa(self) -> float:
+        """Return the command in force, Pa."""
+        with _dcs(self._arguments) as dcs:
+            return float(dcs.get("command"))
+
+    def play(self, program: "Program") -> "PlayedProgram":
+        """Play a program and return what the daemon's recorder has of it."""
+        from config.codes import ExperimentState
+        from positioner.tests_on_the_valve.program import PLAYED, Played
+
+        within_s = 2.0 * self._file.experiment.limit_s + RECORDED_WITHIN_S
+        with _dcs(self._arguments) as dcs:
+            state = dcs.play(program.points, within_s, turn_m=program.turn_m, band_m=program.band_m)
+            problem = "" if state in PLAYED else why_not(state, dcs)
+        points = program.points if state is ExperimentState.COMPLETE else ()
+        recording = recorded(self._folder, self._file.valve.name, points)
+        if recording is None and not problem:
+            problem = f"what is recorded in {self._folder} is not the whole of it"
+        return Played(recording, state, problem)
 
 
 def player_on(file: "DaemonFile", arguments: argparse.Namespace) -> "Player":
@@ -89,13 +127,15 @@ def why_not(state: "ExperimentState", dcs: "Dcs") -> str:
 def recorded(folder: Path, valve: str, points: tuple[tuple[float, float], ...]) -> Recording | None:
     """Return the rows of the experiment that has just ended, once the recorder has written them; None if it does not.
 
+    Without points it may have ended anywhere, so whatever was played last is it.
+
     Raises:
         InputError: a recording cannot be read.
     """
     due_s = time.monotonic() + RECORDED_WITHIN_S
     while time.monotonic() < due_s:
         if found := last_excited(folder, valve):
-            return found if is_of(found, points) else None
+            return found if not points or is_of(found, points) else None
         time.sleep(POLL_S)
     return None
 

@@ -1,0 +1,185 @@
+"""What the commands of tests on the valve share: their options, the running valve, what becomes of an outcome."""
+
+import argparse
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
+
+from positioner.cli.parts.config_argument import add_config, config_files
+from positioner.cli.parts.output_files import writable, write_json
+
+if TYPE_CHECKING:
+    from config.daemon_file import DaemonFile
+    from config.recording import Recording
+    from positioner.tests_on_the_valve.outcome import Outcome
+    from positioner.tests_on_the_valve.program import Played, Player, Program
+
+KINDS = ("factory", "as_found", "as_left")
+"""As `positioner.tests_on_the_valve.kept_records.KINDS`, which is not loaded for `--help`."""
+WINDOW_NEEDED = "experiment.travel_window: a {} goes over the whole travel, allowed is [0, 1], got [{:g}, {:g}]"
+
+
+def add_test_arguments(parser: argparse.ArgumentParser, *, recordings: bool = True) -> None:
+    """Declare the options of every test."""
+    add_config(parser, text="the running daemon's file, with [recorder]")
+    parser.add_argument("--valve", dest="name", metavar="NAME", help="which of that file's valves")
+    if recordings:
+        parser.add_argument(
+            "--rec", type=Path, nargs="+", metavar="REC", help="recordings of such a test: nothing is moved"
+        )
+        parser.add_argument("--stroke-m", type=float, metavar="M", help="with --rec and without a file: the stroke")
+    parser.add_argument("--area-m2", type=float, metavar="M2", help="of the diaphragm: forces in newtons as well")
+    parser.add_argument("--keep", choices=KINDS, help="keep the outcome in the valve's history as this")
+    parser.add_argument("--against", choices=KINDS, help="compare with the newest that is kept as this")
+    parser.add_argument("--json", type=Path, metavar="FILE", help="write verdict and figures as JSON")
+    parser.add_argument("--picture", type=Path, metavar="FILE", help="draw it: .png, .svg or .pdf")
+    parser.add_argument(
+        "--tls",
+        nargs=3,
+        type=Path,
+        metavar=("AUTHORITY.pem", "CERTIFICATE.pem", "KEY"),
+        help="connect with Modbus/TCP Security, as an engineer",
+    )
+
+
+def checked(arguments: argparse.Namespace) -> "DaemonFile | None":
+    """Return the daemon's file, None where recordings are given without one; options that cannot be are refused.
+
+    Raises:
+        InputError: no file where one is needed, a number that cannot be, an output that cannot be written.
+    """
+    from config.daemon_file import load_daemon
+    from config.errors import InputError
+
+    writable(arguments.json, "--json")
+    writable(arguments.picture, "--picture")
+    for option in ("area_m2", "stroke_m"):
+        value = getattr(arguments, option, None)
+        if value is not None and not 0.0 < value < 1e6:
+            raise InputError(f"--{option.replace('_', '-')}", f"allowed is a positive number, got {value:g}")
+    given = config_files(arguments)
+    if len(given) > 1 or (not given and not getattr(arguments, "rec", None)):
+        raise InputError("CONFIG.toml", f"is required, once; {len(given)} were given")
+    if given:
+        arguments.config = given[0]
+        return load_daemon(given[0], arguments.name)
+    if arguments.stroke_m is None:
+        raise InputError("--stroke-m", "is required with --rec where no CONFIG.toml says the stroke")
+    if arguments.keep or arguments.against:
+        raise InputError("CONFIG.toml", "is required by --keep and --against: it says where records are kept")
+    return None
+
+
+def require_whole_travel(file: "DaemonFile", test: str, config: Path) -> None:
+    """Refuse a test over the whole travel where the window keeps the stem off its ends.
+
+    Raises:
+        InputError: says what to write.
+    """
+    from config.errors import InputError
+
+    low, high = file.experiment.travel_window
+    if low > 0.0 or high < 1.0:
+        raise InputError(str(config), WINDOW_NEEDED.format(test, low, high))
+
+
+def played_all(player: "Player", programs: "tuple[Program, ...]") -> "list[Played]":
+    """Play programs one after another until one does not come to its end; say what goes on."""
+    import sys
+
+    from positioner.tests_on_the_valve.program import PLAYED
+
+    played = []
+    for number, program in enumerate(programs, start=1):
+        of = f"{number} of {len(programs)}"
+        print(f"{of}: {program.name}, {program.lasts_s:.0f} s", file=sys.stderr, flush=True)
+        played.append(player.play(program))
+        if played[-1].state not in PLAYED:
+            break
+    return played
+
+
+def recordings_of(played: "list[Played]") -> "list[Recording]":
+    """Return the recordings of what was played to its end.
+
+    Raises:
+        CommandFailed: something was broken off; says by what.
+    """
+    from config.errors import CommandFailed
+
+    for each in played:
+        if each.problem or each.recording is None:
+            raise CommandFailed(f"broken off: {each.problem or each.state.text}; the law has the valve again")
+    return [each.recording for each in played if each.recording is not None]
+
+
+def finished(outcome: "Outcome", file: "DaemonFile | None", arguments: argparse.Namespace) -> int:
+    """Compare, keep, print and draw an outcome; 0 if it passed, else 1."""
+    from dataclasses import replace
+
+    from config.codes import ValveTestVerdict
+    from positioner.tests_on_the_valve.kept_records import baseline, change_table, changes
+
+    compared: list[Any] = []
+    if file is not None:
+        before = baseline(records_folder(file, arguments.config), outcome.test, arguments.against)
+        if before is not None:
+            compared = changes(outcome, before.outcome)
+            if any(each.changed for each in compared):
+                others = tuple(each for each in outcome.verdicts if each is not ValveTestVerdict.PASSED)
+                table = change_table(compared, before.told)
+                outcome = replace(
+                    outcome, verdicts=(*others, ValveTestVerdict.CHANGED), tables=(*outcome.tables, table)
+                )
+            else:
+                outcome = replace(outcome, notes=(*outcome.notes, f"nothing has changed since the {before.told}"))
+    print(outcome.summary())
+    if arguments.json is not None:
+        write_json(arguments.json, outcome.as_json() | {"compared": [_change(each) for each in compared]}, indent=1)
+    if arguments.picture is not None:
+        draw(outcome, arguments.picture)
+    if file is not None and arguments.keep is not None:
+        print(f"kept as {arguments.keep.replace('_', ' ')}: {kept(outcome, file, arguments)}")
+    return 0 if outcome.passed else 1
+
+
+def records_folder(file: "DaemonFile", config: Path) -> Path:
+    """Return where the records of a valve are kept."""
+    from positioner.tests_on_the_valve.kept_records import folder_of
+
+    beside = Path(config).parent
+    return folder_of(beside if file.history is None else beside / file.history.folder, file.valve.name)
+
+
+def kept(outcome: "Outcome", file: "DaemonFile", arguments: argparse.Namespace) -> Path:
+    """Keep an outcome with what was configured, and return its file."""
+    import time
+
+    from positioner.tests_on_the_valve.kept_records import keep
+
+    tables = file.model_dump(mode="json", include={"valve", "device", "pressure", "experiment", "law", "control"})
+    return keep(records_folder(file, arguments.config), outcome, arguments.keep or "", time.time(), tables)
+
+
+def draw(outcome: "Outcome", path: Path) -> None:
+    """Draw the picture of an outcome.
+
+    Raises:
+        InputError: it cannot be written, or it is named as no picture is.
+    """
+    from config.errors import InputError
+
+    try:
+        outcome.plot().savefig(path)
+    except (OSError, ValueError) as error:
+        raise InputError(f"--picture {path}", f"cannot be drawn: {error}") from None
+
+
+def _change(change: Any) -> dict[str, object]:
+    return {
+        "name": change.quantity.name,
+        "before": change.before.figure.value,
+        "now": change.quantity.figure.value,
+        "deviations": change.deviations,
+        "changed": change.changed,
+        "means": change.means if change.changed else "",
+    }

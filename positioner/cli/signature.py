@@ -1,0 +1,45 @@
+"""`positioner signature`: slow ramps over the whole travel, on the running valve or from recordings of them."""
+
+import argparse
+
+from positioner.cli.parts.valve_test import (
+    add_test_arguments,
+    checked,
+    finished,
+    played_all,
+    recordings_of,
+    require_whole_travel,
+)
+
+HELP = "friction, spring rate, bench set, seat load of the valve, by slow ramps over its travel (moves it: state S3)"
+EXAMPLE = "positioner signature site.toml --area-m2 0.07 --keep as_left"
+
+
+def add_arguments(parser: argparse.ArgumentParser) -> None:
+    """Declare the command line."""
+    add_test_arguments(parser)
+
+
+def run(arguments: argparse.Namespace) -> int:
+    """Play the ramps, or read their recordings; print what they show; 0 if all is there and as it was, else 1."""
+    from config.recording import Recording
+    from positioner.tests_on_the_valve.signature import Nameplate, programmes, signature
+
+    file = checked(arguments)
+    if arguments.rec:
+        recordings = [Recording.read(path) for path in arguments.rec]
+    else:
+        from positioner.cli.parts.breaking_off import ended_as_by_ctrl_c
+        from positioner.cli.parts.experiment_player import RunningValve, require_ready
+        from positioner.control.settings import Settings
+
+        assert file is not None
+        require_whole_travel(file, "signature", arguments.config)
+        require_ready(file, arguments)
+        valve = RunningValve(file, arguments)
+        programs = programmes(Settings.of(file).experiment, valve.command_pa(), str(arguments.config))
+        with ended_as_by_ctrl_c():
+            recordings = recordings_of(played_all(valve, programs))
+    name = str(arguments.rec[0]) if file is None else file.valve.name
+    stroke_m = arguments.stroke_m if file is None else file.valve.stroke_m
+    return finished(signature(recordings, Nameplate(name, stroke_m, arguments.area_m2)), file, arguments)

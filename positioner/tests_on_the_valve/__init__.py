@@ -1,0 +1,12 @@
+"""Tests that move the valve, and what they show: programs for played experiments, with their figures and verdicts.
+
+For the instrument technician: docs/tests-on-the-valve.md. A test knows nothing of who plays it: a running daemon's
+registers, a cycle of the command's own, or virtual time. It needs numpy alone.
+
+    program                         what is played, within what, and what came of it
+    own_cycle                       programs on a cycle that this process turns itself
+    ramps                           slow ramps: lines, ends, and what they are at no rate
+    signature                       the valve signature: friction, spring rate, bench set, seat load, bands
+    outcome                         figures, verdicts by their codes, picture; how they show themselves
+    kept_records                    as found, as left, factory: kept, and what has changed since
+"""

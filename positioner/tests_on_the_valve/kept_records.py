@@ -1,0 +1,234 @@
+"""Records of tests, kept in the valve's history: as found, as left, as the factory left it; and what has changed since.
+
+A record is one JSON file, `STAMP_TEST.json`, in a folder of the valve's own: outcome, picture, what was configured.
+`[history] folder` of the daemon's file is where those folders are; without it the folder of that file.
+
+A figure has changed where it is off by more than `CHANGED` of both deviations together, and by `WORTH` of itself:
+
+    d = (now - before) / sqrt(s_now^2 + s_before^2)      s half of each +-
+"""
+
+import json
+from collections.abc import Iterator, Mapping, Sequence
+from dataclasses import dataclass
+from datetime import UTC, datetime
+from math import hypot, inf
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+from config.errors import InputError
+from config.file_stem import file_stem
+from config.json_value import json_value
+from config.results.block import Table
+from config.whole_file import replace_whole
+from positioner.response.figure import Figure
+from positioner.tests_on_the_valve.outcome import Curve, Outcome, Picture, Quantity
+
+KINDS = ("factory", "as_found", "as_left")
+"""What a record is kept as; the newest of a kind stands for it."""
+BASELINES = ("as_left", "factory")
+"""What a test is compared with where nobody says, the first that is there."""
+FOLDER = "tests"
+CHANGED = 4.0
+"""Deviations: of twenty figures one in a thousand comparisons is off by so much without a change."""
+WORTH = 0.02
+"""Of a figure: less than this is no change that anybody acts on, however certain."""
+MOST_POINTS = 600
+"""Of a curve that is kept: more than a picture shows."""
+MEANS: Mapping[str, tuple[str, str]] = {
+    "friction_pa": (
+        "friction lower: packing loose or worn, it may leak",
+        "friction higher: packing tight or dry, or the stem rubs",
+    ),
+    "spring_pa_per_m": (
+        "spring weaker, or more area: a spring is broken, or another actuator",
+        "spring stiffer: something rubs ever more, or another spring",
+    ),
+    "bench_low_pa": ("bench set lower: the spring is set looser", "bench set higher: the spring is set tighter"),
+    "seat_load_pa": (
+        "less seat load: it may leak through; spring, or least command",
+        "more seat load: the spring is set tighter, or the friction is lower",
+    ),
+    "travel_m": (
+        "travel shorter: something lies on the seat, or a stop is set",
+        "travel longer: a stop",
+    ),
+    "low_m": ("lower end lower: seat worn, or the reading's zero", "lower end higher: something lies on the seat"),
+    "lag_pa": ("less lag: another tubing or booster", "more lag: tubing or booster choked, air leaks"),
+    "opening_s": ("opens faster", "opens more slowly: supply, tubing, booster or friction"),
+    "closing_s": ("closes faster", "closes more slowly: exhaust, booster, spring or friction"),
+    "breakout_pa": ("breaks loose more easily", "breaks loose harder: packing, or the plug sticks in its seat"),
+}
+"""Of a figure that fell, and that rose: what a technician looks at first."""
+
+
+@dataclass(frozen=True, slots=True)
+class Change:
+    """A figure then and now, and by how many deviations it is off."""
+
+    quantity: Quantity
+    before: Quantity
+    deviations: float
+
+    @property
+    def changed(self) -> bool:
+        """Whether it is off by more than both uncertainties, and by what is worth a look."""
+        now, before = self.quantity.figure.value, self.before.figure.value
+        if now is None or before is None:
+            return now is not before
+        return abs(self.deviations) > CHANGED and abs(now - before) > WORTH * max(abs(now), abs(before))
+
+    @property
+    def means(self) -> str:
+        """What it may mean; empty where nothing is known of it."""
+        low, high = MEANS.get(self.quantity.name, ("", ""))
+        return high if self.deviations > 0 else low
+
+
+@dataclass(frozen=True, slots=True)
+class Record:
+    """A record that is kept: when, as what, the outcome, and what was configured."""
+
+    path: Path
+    time_s: float
+    kind: str
+    outcome: Outcome
+    configuration: Mapping[str, Any]
+
+    @property
+    def told(self) -> str:
+        """What it is, in a few words."""
+        when = datetime.fromtimestamp(self.time_s, UTC)
+        return f"{self.kind.replace('_', ' ') or 'test'} of {when:%Y-%m-%d %H:%M} UTC"
+
+
+def folder_of(history: Path, valve: str) -> Path:
+    """Return where the records of a valve are."""
+    return history / FOLDER / file_stem(valve)
+
+
+def keep(folder: Path, outcome: Outcome, kind: str, time_s: float, configuration: Mapping[str, Any]) -> Path:
+    """Keep an outcome, and return its file.
+
+    Raises:
+        InputError: it cannot be written.
+    """
+    when = datetime.fromtimestamp(time_s, UTC)
+    path = folder / f"{when:%Y%m%dT%H%M%S%f}_{outcome.test.replace(' ', '_')}.json"
+    picture = outcome.picture
+    told = {
+        "time_s": time_s,
+        "kind": kind,
+        "outcome": outcome.as_json(),
+        "tables": [{"title": each.title, "headings": each.headings, "rows": each.rows} for each in outcome.tables],
+        "picture": None
+        if picture is None
+        else {"x": picture.x, "y": picture.y, "curves": [_kept_curve(each) for each in picture.curves]},
+        "configuration": configuration,
+    }
+    try:
+        folder.mkdir(parents=True, exist_ok=True)
+        replace_whole(path, json.dumps(json_value(told), allow_nan=False, default=str) + "\n")
+    except OSError as error:
+        raise InputError(str(path), f"cannot be written: {error.strerror}") from None
+    return path
+
+
+def records(folder: Path, test: str | None = None, kind: str | None = None) -> list[Record]:
+    """Return the records of a valve, oldest first, of one test or kind if so asked.
+
+    Raises:
+        InputError: a record cannot be read.
+    """
+    found = [_read(path) for path in sorted(folder.glob("*.json"))]
+    return [each for each in found if test in (None, each.outcome.test) and kind in (None, each.kind)]
+
+
+def baseline(folder: Path, test: str, against: str | None) -> Record | None:
+    """Return the newest record of a kind; where nobody says which, as left, or else the factory's; None without one.
+
+    Raises:
+        InputError: one was asked for, and there is none.
+    """
+    for kind in BASELINES if against is None else (against,):
+        if found := records(folder, test, kind):
+            return found[-1]
+    if against is not None:
+        raise InputError(f"--against {against}", f"no {test} is kept as {against} in {folder}")
+    return None
+
+
+def changes(now: Outcome, before: Outcome) -> list[Change]:
+    """Return the figures of both, how far each is off."""
+    then = {each.name: each for each in before.quantities}
+    return [
+        Change(each, then[each.name], _deviations(each.figure, then[each.name].figure))
+        for each in now.quantities
+        if each.name in then
+    ]
+
+
+def change_table(told: Sequence[Change], since: str) -> Table:
+    """Return what has changed as a table, what has not left out."""
+    rows = [
+        (each.quantity.text, each.before.shown, each.quantity.shown, f"{each.deviations:+.3g}", each.means)
+        for each in told
+        if each.changed
+    ]
+    return Table(("figure", "before ", "now ", "deviations", ""), rows, f"changed since the {since}")
+
+
+def _deviations(now: Figure, before: Figure) -> float:
+    if now.value is None or before.value is None:
+        return 0.0
+    std = 0.5 * hypot(now.plus_minus or 0.0, before.plus_minus or 0.0)
+    off = now.value - before.value
+    return off / std if std > 0.0 else (0.0 if off == 0.0 else inf * off)
+
+
+def _kept_curve(curve: Curve) -> dict[str, object]:
+    every = max(1, len(curve.x) // MOST_POINTS)
+    return {"name": curve.name, "x": curve.x[::every], "y": curve.y[::every], "points": curve.points}
+
+
+def _read(path: Path) -> Record:
+    from config.codes import ValveTestVerdict
+
+    try:
+        told = json.loads(path.read_text(encoding="utf-8"))
+        outcome, picture = told["outcome"], told["picture"]
+        return Record(
+            path,
+            float(told["time_s"]),
+            str(told["kind"]),
+            Outcome(
+                outcome["test"],
+                outcome["valve"],
+                tuple(_quantities(outcome["figures"])),
+                tuple(ValveTestVerdict(each["code"]) for each in outcome["verdicts"]),
+                tuple(outcome["notes"]),
+                tuple(Table(each["headings"], each["rows"], each["title"]) for each in told["tables"]),
+                None if picture is None else _picture(picture),
+            ),
+            told["configuration"],
+        )
+    except OSError as error:
+        raise InputError(str(path), f"cannot be read: {error.strerror}") from None
+    except (ValueError, KeyError, TypeError, AttributeError):
+        raise InputError(str(path), "is no record of a test on the valve: move it out of this folder") from None
+
+
+def _quantities(told: Mapping[str, Any]) -> Iterator[Quantity]:
+    for name, each in told.items():
+        figure = Figure(each["value"], each["plus_minus"], each["reason"])
+        yield Quantity(name, each["text"], each["unit"], figure, each["expected"])
+
+
+def _picture(told: Mapping[str, Any]) -> Picture:
+    curves = (
+        Curve(each["name"], np.array(each["x"], dtype=float), np.array(each["y"], dtype=float), each["points"])
+        for each in told["curves"]
+    )
+    return Picture(told["x"], told["y"], tuple(curves))

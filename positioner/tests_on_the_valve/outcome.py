@@ -1,0 +1,179 @@
+"""What a test on the valve comes to: figures with their uncertainty, verdicts by their codes, a picture."""
+
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, field
+from typing import TYPE_CHECKING
+
+from config.codes import ValveTestVerdict
+from config.recording import Column
+from config.results.block import Block, Table
+from config.results.result import Result
+from positioner.response.figure import Figure
+
+if TYPE_CHECKING:
+    from matplotlib.axes import Axes
+    from matplotlib.figure import Figure as Drawing
+
+SHOWN = {
+    "m": (1e3, "mm"),
+    "Pa": (1e-3, "kPa"),
+    "Pa/m": (1e-6, "kPa/mm"),
+    "m/Pa": (1e6, "mm/kPa"),
+    "Pa/s": (1e-3, "kPa/s"),
+    "1": (100.0, "%"),
+    "m/s": (1e3, "mm/s"),
+}
+"""Units as they are printed, of those that SI has inside; others are printed as they are."""
+
+
+@dataclass(frozen=True, slots=True)
+class Quantity:
+    """A figure of a test: what it is called, its SI unit, its value; `expected` is what it should be, where known."""
+
+    name: str
+    text: str
+    unit: str
+    figure: Figure
+    expected: float | None = None
+
+    @property
+    def shown(self) -> str:
+        """The value with its +- in the unit people use, or why there is none."""
+        if self.figure.value is None:
+            return f"cannot be determined: {self.figure.reason}"
+        scale, unit = SHOWN.get(self.unit, (1.0, self.unit))
+        value = f"{scale * self.figure.value:.5g}"
+        error = "" if self.figure.plus_minus is None else f" ± {scale * self.figure.plus_minus:.2g}"
+        return f"{value}{error} {unit}"
+
+    @property
+    def shown_expected(self) -> str:
+        """What it should be in the same unit; empty where nobody has said."""
+        if self.expected is None:
+            return ""
+        scale, unit = SHOWN.get(self.unit, (1.0, self.unit))
+        return f"{scale * self.expected:.5g} {unit}"
+
+
+@dataclass(frozen=True, slots=True)
+class Curve:
+    """A line of the picture: Pa or s over m, as the picture says."""
+
+    name: str
+    x: Column
+    y: Column
+    points: bool = False
+
+
+@dataclass(frozen=True, slots=True)
+class Picture:
+    """What is drawn of a test: curves over one axis, what the axes are."""
+
+    x: str
+    y: str
+    curves: tuple[Curve, ...]
+
+    def draw(self, axes: "Axes") -> None:
+        """Draw the curves on axes of matplotlib."""
+        from config.results.drawing import BETTER, MEASURED, MODEL, QUIET, legend
+
+        for curve, colour in zip(self.curves, (MEASURED, MODEL, BETTER, QUIET) * len(self.curves), strict=False):
+            style = {"marker": ".", "ls": "none", "ms": 2.0} if curve.points else {"lw": 1.1}
+            axes.plot(curve.x, curve.y, color=colour, label=curve.name, **style)
+        axes.set_xlabel(self.x)
+        axes.set_ylabel(self.y)
+        legend(axes)
+
+
+@dataclass(frozen=True, slots=True, repr=False)
+class Outcome(Result):
+    """The outcome of one test of one valve; SI units."""
+
+    test: str
+    valve: str
+    quantities: tuple[Quantity, ...]
+    verdicts: tuple[ValveTestVerdict, ...]
+    notes: tuple[str, ...] = ()
+    tables: tuple[Table, ...] = ()
+    picture: Picture | None = field(default=None, compare=False)
+
+    @property
+    def passed(self) -> bool:
+        """Whether the verdict is that it passed, and nothing else."""
+        return self.verdicts == (ValveTestVerdict.PASSED,)
+
+    def figure(self, name: str) -> Figure:
+        """Return a figure by its name.
+
+        Raises:
+            KeyError: the test has none of that name.
+        """
+        return next(each.figure for each in self.quantities if each.name == name)
+
+    @property
+    def said(self) -> str:
+        """The verdicts in words."""
+        return "; ".join(each.text for each in self.verdicts)
+
+    def blocks(self) -> Sequence[Block]:
+        """Say the verdict, the figures, and what else was noted."""
+        expected = any(each.expected is not None for each in self.quantities)
+        headings = ("", "measured ", *(("expected ",) if expected else ()))
+        rows = [
+            (each.text, each.shown, *((each.shown_expected,) if expected else ()))
+            for each in self.quantities
+            if each.figure.value is not None
+        ]
+        missing = [f"- {each.text}: {each.shown}" for each in self.quantities if each.figure.value is None]
+        return [
+            f"{self.test} of {self.valve}: {self.said}",
+            *([Table(headings, rows)] if rows else []),
+            *missing,
+            *self.tables,
+            *(f"note: {each}" for each in self.notes),
+        ]
+
+    def frame_columns(self) -> Mapping[str, list[object]]:
+        """Return a row a figure."""
+        return {
+            "name": [each.name for each in self.quantities],
+            "unit": [each.unit for each in self.quantities],
+            "value": [each.figure.value for each in self.quantities],
+            "plus_minus": [each.figure.plus_minus for each in self.quantities],
+            "reason": [each.figure.reason for each in self.quantities],
+        }
+
+    def as_json(self) -> dict[str, object]:
+        """Return everything but the picture as plain values; null for what cannot be determined."""
+        return {
+            "test": self.test,
+            "valve": self.valve,
+            "verdicts": [{"code": int(each), "name": each.name, "text": each.text} for each in self.verdicts],
+            "passed": self.passed,
+            "figures": {
+                each.name: {
+                    "text": each.text,
+                    "unit": each.unit,
+                    "value": each.figure.value,
+                    "plus_minus": each.figure.plus_minus,
+                    "reason": each.figure.reason,
+                    "expected": each.expected,
+                }
+                for each in self.quantities
+            },
+            "notes": list(self.notes),
+        }
+
+    def plot(self) -> "Drawing":
+        """Draw the picture of the test.
+
+        Raises:
+            ValueError: it has none.
+        """
+        from config.results.drawing import panels
+
+        if self.picture is None:
+            raise ValueError(f"the {self.test} has no picture")
+        figure, (axes,) = panels((5.0,))
+        self.picture.draw(axes)
+        return figure

@@ -1,0 +1,92 @@
+"""What is played on the valve for a test: a sequence of commands, and how far the stem may go by it.
+
+A program is a played experiment (`positioner.control.played_experiment`), which holds its permissives, its window and
+the way back: no test has a way of its own to move the valve.
+"""
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+from typing import Protocol
+
+from config.codes import ExperimentState
+from config.recording import Recording
+from positioner.control.played_experiment import ExperimentLimits
+
+Bounds = ExperimentLimits
+"""What every program must stay inside: those of the experiments."""
+SHORTEST_S = 1e-3
+"""Between two points, which must follow each other."""
+
+
+@dataclass(frozen=True, slots=True)
+class Program:
+    """Times from 0 up, s, and commands, Pa.
+
+    Attributes:
+        turn_m: travel from where it begins at which it turns and retraces its way; 0: none.
+        band_m: travel from there beyond which it is broken off; 0: the file's window alone.
+    """
+
+    name: str
+    points: tuple[tuple[float, float], ...]
+    turn_m: float = 0.0
+    band_m: float = 0.0
+
+    @property
+    def lasts_s(self) -> float:
+        """How long it takes, without the way to its first command, s."""
+        return self.points[-1][0]
+
+
+@dataclass(frozen=True, slots=True)
+class Leap:
+    """The next command of a sequence, Pa, and how long it is held, s."""
+
+    to_pa: float
+    held_s: float
+
+
+@dataclass(frozen=True, slots=True)
+class Played:
+    """What was recorded of a program, and what became of it; without a recording `problem` says why."""
+
+    recording: Recording | None
+    state: ExperimentState
+    problem: str = ""
+
+
+PLAYED = (ExperimentState.COMPLETE, ExperimentState.TURNED)
+"""What a program comes to that was not broken off."""
+
+
+class Player(Protocol):
+    """Plays programs on a valve, in whatever world it is."""
+
+    def command_pa(self) -> float:
+        """Return the command in force, Pa."""
+        ...
+
+    def play(self, program: Program) -> Played:
+        """Play one to its end."""
+        ...
+
+
+def ramped(
+    name: str,
+    start_pa: float,
+    leaps: Sequence[Leap],
+    rate_pa_per_s: float,
+    *,
+    turn_m: float = 0.0,
+    band_m: float = 0.0,
+) -> Program:
+    """Return a program that begins at the command in force and goes from leap to leap at one rate."""
+    points = [(0.0, start_pa)]
+    for leap in leaps:
+        time_s, before_pa = points[-1]
+        if leap.to_pa != before_pa:
+            time_s += max(SHORTEST_S, abs(leap.to_pa - before_pa) / rate_pa_per_s)
+            points.append((time_s, leap.to_pa))
+        if leap.held_s > 0.0:
+            points.append((time_s + leap.held_s, leap.to_pa))
+    return Program(name, tuple(points), turn_m, band_m)

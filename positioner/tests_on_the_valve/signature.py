@@ -1,0 +1,355 @@
+"""The valve signature: slow ramps of the command over the whole travel, up and down, at two rates.
+
+Of the straight part of each ramp (`ramps`), taken to no rate, so that neither lag nor viscous friction is left in it,
+
+    p_s(x) = (k x + F_0 + s F) / A        s = +1 up, -1 down, x from the lower end
+
+follow, of the travel from x_0 to x_1,
+
+    spring rate / area      k/A = dp/dx
+    friction / area         F/A = (p_up - p_down) / 2               at half travel
+    bench set               (p_up + p_down) / 2                     at x_0 and at x_1: without friction
+    seat load / area        p_down(x_0) - p_least                   what presses on the seat at the least command
+    hysteresis              (p_up - p_down) / (bench set's span)    dead band included, at half travel
+    dynamic error band      x_down - x_up at one command            at the slowest rate played, lag and all
+    linearity               farthest of (x_up + x_down) / 2 from its best straight line
+
+Friction over travel is the half distance at the slowest rate, in bins of a tenth, less what the rate adds.
+Every +- is two standard deviations. With the diaphragm's area, forces follow in newtons.
+"""
+
+from dataclasses import dataclass, replace
+from itertools import pairwise
+from math import hypot, sqrt
+
+import numpy as np
+
+from config.codes import ValveTestVerdict
+from config.errors import InputError
+from config.recording import Column, Recording
+from config.results.block import Table
+from positioner.response.figure import Figure, undetermined
+from positioner.tests_on_the_valve.outcome import Curve, Outcome, Picture, Quantity
+from positioner.tests_on_the_valve.program import Bounds, Leap, Program, ramped
+from positioner.tests_on_the_valve.ramps import (
+    FEWEST,
+    TWO_SIGMA,
+    Leg,
+    Line,
+    Ramps,
+    difference,
+    legs_of,
+    mean,
+    ramps_of,
+)
+
+RATIO = 4.0
+"""Of the fast rate to the slow one: taken to no rate, the slow ramp's error grows by 4/3 only."""
+HELD_S = 1.0
+"""At each end, for the stem to come to rest."""
+SLOWEST_LEG_S = 60.0
+"""Slower than this a ramp adds time and no precision: the stem sticks and slips."""
+SHORTEST_LEG_S = 5.0
+"""Faster than this no ramp is slow."""
+DECILES = tuple(0.1 * each for each in range(1, 10))
+STROKE_WRONG = 0.05
+"""Of the stroke: a travel farther from it is another stroke than the file says."""
+SUPPLY_LACKING = 0.05
+"""Of the commands' span: a measured pressure farther from the command at its extremes is no supply, or no I/P."""
+
+
+@dataclass(frozen=True, slots=True)
+class Nameplate:
+    """What is known of the valve before: m, and m^2 where the area is known."""
+
+    valve: str
+    stroke_m: float
+    area_m2: float | None = None
+
+
+def programmes(bounds: Bounds, start_pa: float, source: str = "experiment") -> tuple[Program, ...]:
+    """Return the slow ramps, twice, and the fast ones, each a program of its own, as slow as the time limit permits.
+
+    From the command in force to the least one, up, down, and back; the fast ones go up and down twice.
+
+    Raises:
+        InputError: the time limit leaves no time for slow ramps; names the source.
+    """
+    span_pa = bounds.maximum_pa - bounds.minimum_pa
+    spare_s = 5.0 * HELD_S
+    slow_s = min(SLOWEST_LEG_S, 0.95 * (bounds.longest_s - spare_s) / 4.0)
+    if slow_s < max(SHORTEST_LEG_S, RATIO * span_pa / bounds.rate_pa_per_s):
+        least_s = 4.0 * max(SHORTEST_LEG_S, RATIO * span_pa / bounds.rate_pa_per_s) / 0.95 + spare_s
+        raise InputError(
+            source, f"experiment.limit_s: a signature needs {least_s:.3g} s or more, got {bounds.longest_s:g}"
+        )
+    fast_s = max(slow_s / RATIO, span_pa / bounds.rate_pa_per_s)
+    lowest, highest = bounds.minimum_pa, bounds.maximum_pa
+    slow, fast = span_pa / slow_s, span_pa / fast_s
+    up_and_down = (Leap(highest, HELD_S), Leap(lowest, HELD_S))
+    return (
+        ramped("slow ramps", start_pa, (Leap(lowest, HELD_S), *up_and_down, Leap(start_pa, HELD_S)), slow),
+        ramped("slow ramps", start_pa, (Leap(lowest, HELD_S), *up_and_down, Leap(start_pa, HELD_S)), slow),
+        ramped("fast ramps", start_pa, (Leap(lowest, HELD_S), *2 * up_and_down, Leap(start_pa, HELD_S)), fast),
+    )
+
+
+def signature(recordings: "list[Recording]", plate: Nameplate) -> Outcome:
+    """Return the signature that recordings of ramps show; whatever they do not show says why."""
+    legs = [leg for recording in recordings for leg in legs_of(recording)]
+    ramps = ramps_of(legs)
+    if not ramps.lines:
+        return _without_motion(recordings, legs, plate)
+    low, high = ramps.low_m, ramps.high_m
+    travel = difference(high, low)
+    x_0 = 0.0 if low.value is None else low.value
+    x_1 = plate.stroke_m if high.value is None else high.value
+    notes = [f"{each.reason}: the file's stroke stands for it" for each in (low, high) if each.reason]
+    rates = ", ".join(f"{1e-3 * each:.3g}" for each in ramps.rates_pa_per_s)
+    notes.append(f"{len(ramps.lines)} ramps at {rates} kPa/s")
+    verdict, told = _verdict(travel, plate)
+    quantities = [
+        *_ends(ramps, travel),
+        *_spring(ramps, plate),
+        *_friction(ramps, plate, x_0, x_1),
+        *_bench_set(ramps, plate, x_0, x_1, float(min(np.min(each.command_pa) for each in legs))),
+        *_bands(ramps, x_0, x_1),
+        Quantity("noise_m", "noise about the lines", "m", Figure(ramps.noise_m)),
+    ]
+    return Outcome(
+        "signature",
+        plate.valve,
+        tuple(quantities),
+        verdict,
+        (*notes, *told),
+        (_over_travel(ramps, plate, x_0, x_1),),
+        _picture(ramps),
+    )
+
+
+def _without_motion(recordings: "list[Recording]", legs: list[Leg], plate: Nameplate) -> Outcome:
+    if not legs:
+        why = "no ramp in the recording: the command goes nowhere one way for most of what it spans"
+        return Outcome("signature", plate.valve, (), (ValveTestVerdict.UNDETERMINED,), (why,))
+    supply = _supply_lacking(recordings)
+    verdict = ValveTestVerdict.NO_SUPPLY if supply else ValveTestVerdict.NOT_MOVED
+    why = supply or "the stem did not follow the command: it is stuck, it has no supply, or the reading is another's"
+    return Outcome("signature", plate.valve, (), (verdict,), (why,))
+
+
+def _supply_lacking(recordings: "list[Recording]") -> str:
+    """Say how far the measured pressure stays from the command where that is highest; empty where it does not."""
+    for each in recordings:
+        pressure_pa = each.columns.get("pressure_pa")
+        if pressure_pa is None or not np.isfinite(pressure_pa).any():
+            continue
+        command_pa = each.command_pa
+        high = command_pa >= np.nanmax(command_pa) - 1e-3 * np.ptp(command_pa)
+        reached, asked = float(np.nanmax(pressure_pa[high])), float(np.nanmax(command_pa))
+        if asked - reached > SUPPLY_LACKING * float(np.ptp(command_pa)):
+            return f"the pressure stays at {1e-3 * reached:.4g} kPa where {1e-3 * asked:.4g} kPa is commanded"
+    return ""
+
+
+def _verdict(travel: Figure, plate: Nameplate) -> tuple[tuple[ValveTestVerdict, ...], list[str]]:
+    if travel.value is None:
+        return (ValveTestVerdict.UNDETERMINED,), ["the ramps did not take the stem from end to end"]
+    off_m = abs(travel.value - plate.stroke_m)
+    if off_m > max(STROKE_WRONG * plate.stroke_m, travel.plus_minus or 0.0):
+        told = (
+            f"valve.stroke_m says {1e3 * plate.stroke_m:.4g} mm, the stem travels {1e3 * travel.value:.4g} mm: "
+            "one of them is wrong"
+        )
+        return (ValveTestVerdict.STROKE_DIFFERS,), [told]
+    return (ValveTestVerdict.PASSED,), []
+
+
+def _ends(ramps: Ramps, travel: Figure) -> list[Quantity]:
+    return [
+        Quantity("low_m", "lower end of the travel", "m", ramps.low_m),
+        Quantity("high_m", "upper end of the travel", "m", ramps.high_m),
+        Quantity("travel_m", "travel", "m", travel),
+    ]
+
+
+def _spring(ramps: Ramps, plate: Nameplate) -> list[Quantity]:
+    slope = ramps.slope_pa_per_m()
+    return [
+        Quantity("spring_pa_per_m", "spring rate over 10 to 90 %", "Pa/m", slope),
+        *_force("spring_n_per_m", "spring rate", "N/m", slope, plate),
+    ]
+
+
+def _force(name: str, text: str, unit: str, figure: Figure, plate: Nameplate) -> list[Quantity]:
+    """Return the same as a force, where the area is known."""
+    if plate.area_m2 is None:
+        return []
+    return [Quantity(name, text, unit, _scaled(figure, plate.area_m2))]
+
+
+def _scaled(figure: Figure, by: float) -> Figure:
+    if figure.value is None:
+        return figure
+    return Figure(by * figure.value, None if figure.plus_minus is None else abs(by) * figure.plus_minus)
+
+
+def _friction(ramps: Ramps, plate: Nameplate, x_0: float, x_1: float) -> list[Quantity]:
+    half = 0.5 * (x_0 + x_1)
+    still = difference(ramps.at_no_rate(1, half), ramps.at_no_rate(-1, half), 0.5)
+    slow = difference(ramps.at_slowest(1, half), ramps.at_slowest(-1, half), 0.5)
+    lag = difference(slow, still)
+    return [
+        Quantity("friction_pa", "friction at half travel, taken to no rate", "Pa", still),
+        *_force("friction_n", "friction", "N", still, plate),
+        Quantity("friction_at_rate_pa", "the same at the slowest rate, lag and all", "Pa", slow),
+        Quantity("lag_pa", "of it lag and viscous friction", "Pa", replace(lag, plus_minus=still.plus_minus)),
+    ]
+
+
+def _bench_set(ramps: Ramps, plate: Nameplate, x_0: float, x_1: float, least_pa: float) -> list[Quantity]:
+    ups = [ramps.at_no_rate(1, each) for each in (x_0, x_1)]
+    downs = [ramps.at_no_rate(-1, each) for each in (x_0, x_1)]
+    if ups[0].value is None:  # of one rate alone: the mean of both directions has no lag
+        ups = [ramps.at_slowest(1, each) for each in (x_0, x_1)]
+        downs = [ramps.at_slowest(-1, each) for each in (x_0, x_1)]
+    slope = ramps.slope_pa_per_m().value or 0.0
+    for told in (ups, downs):  # where the end is, is known no better than it was seen
+        told[:] = [_widened(each, slope, end) for each, end in zip(told, (ramps.low_m, ramps.high_m), strict=True)]
+    low, high = (_together(up, down) for up, down in zip(ups, downs, strict=True))
+    unseated = undetermined("the stem was not seen on its seat")
+    seat = unseated if ramps.low_m.value is None else difference(downs[0], Figure(least_pa, 0.0))
+    return [
+        Quantity("bench_low_pa", "bench set, lower end", "Pa", low),
+        Quantity("bench_high_pa", "bench set, upper end", "Pa", high),
+        Quantity("opens_at_pa", "leaves the lower end at", "Pa", ups[0]),
+        Quantity("closes_at_pa", "is back on it at", "Pa", downs[0]),
+        Quantity("seat_load_pa", "seat load at the least command, over the area", "Pa", seat),
+        *_force("seat_load_n", "seat load", "N", seat, plate),
+    ]
+
+
+def _widened(figure: Figure, slope_pa_per_m: float, end: Figure) -> Figure:
+    """Return a pressure at an end with what that is uncertain by."""
+    if figure.value is None:
+        return figure
+    by_end = slope_pa_per_m * (end.plus_minus or 0.0)
+    return Figure(figure.value, hypot(figure.plus_minus or 0.0, by_end))
+
+
+def _together(up: Figure, down: Figure) -> Figure:
+    """Return the mean of both directions; the end's own uncertainty, which they share, does not shrink."""
+    if up.value is None or down.value is None:
+        return mean(up, down)
+    return Figure(0.5 * (up.value + down.value), max(up.plus_minus or 0.0, down.plus_minus or 0.0))
+
+
+def _bands(ramps: Ramps, x_0: float, x_1: float) -> list[Quantity]:
+    half = 0.5 * (x_0 + x_1)
+    apart = difference(ramps.at_no_rate(1, half), ramps.at_no_rate(-1, half))
+    slope = ramps.slope_pa_per_m().value or 1.0
+    hysteresis = _scaled(apart, 1.0 / (slope * (x_1 - x_0)))
+    centres, up, down, error = _averaged(ramps, x_0, x_1)
+    few = undetermined("too few samples of both directions at one command")
+    largest, average, linear = few, few, few
+    if len(centres):
+        band = (down - up) / (x_1 - x_0)
+        at = int(np.argmax(band))
+        largest = Figure(float(band[at]), TWO_SIGMA * sqrt(2.0) * float(error[at]) / (x_1 - x_0))
+        average = Figure(
+            float(np.mean(band)), TWO_SIGMA * sqrt(2.0) * float(np.sqrt(np.mean(error**2) / len(band))) / (x_1 - x_0)
+        )
+        middle = 0.5 * (up + down)
+        off = middle - np.polyval(np.polyfit(centres, middle, 1), centres)
+        at = int(np.argmax(np.abs(off)))
+        linear = Figure(float(abs(off[at])) / (x_1 - x_0), TWO_SIGMA * float(error[at]) / sqrt(2.0) / (x_1 - x_0))
+    return [
+        Quantity("hysteresis", "hysteresis and dead band, of the span", "1", hysteresis),
+        Quantity("dynamic_error_band", "dynamic error band at the slowest rate, largest", "1", largest),
+        Quantity("dynamic_error_band_mean", "the same, mean", "1", average),
+        Quantity("linearity", "linearity: farthest from the best line", "1", linear),
+    ]
+
+
+def _averaged(ramps: Ramps, x_0: float, x_1: float) -> tuple[Column, Column, Column, Column]:
+    """Return commands, mean positions up and down there at the slowest rate, m, and the mean's deviation, m."""
+    up, down = ramps.slowest(1), ramps.slowest(-1)
+    nothing = np.array([])
+    if not up or not down:
+        return nothing, nothing, nothing, nothing
+    first = max(each.pressure_pa(x_0 + 0.05 * (x_1 - x_0))[0] for each in (*up, *down))
+    last = min(each.pressure_pa(x_0 + 0.95 * (x_1 - x_0))[0] for each in (*up, *down))
+    if last <= first:
+        return nothing, nothing, nothing, nothing
+    edges = np.linspace(first, last, 11)
+    centres = 0.5 * (edges[:-1] + edges[1:])
+    told = [_in_bins(lines, edges) for lines in (up, down)]
+    whole = np.isfinite(told[0][0]) & np.isfinite(told[1][0])
+    error = np.hypot(told[0][1], told[1][1]) / sqrt(2.0)
+    return centres[whole], told[0][0][whole], told[1][0][whole], error[whole]
+
+
+def _in_bins(lines: list[Line], edges: Column) -> tuple[Column, Column]:
+    """Return in each bin of the command the position at its middle, m, and its deviation; NaN where samples lack."""
+    p = np.concatenate([each.leg.command_pa for each in lines])
+    x = np.concatenate([each.leg.position_m for each in lines])
+    slope = float(np.mean([each.slope for each in lines]))
+    level, error = np.full(len(edges) - 1, np.nan), np.full(len(edges) - 1, np.nan)
+    for number, (low, high) in enumerate(pairwise(edges.tolist())):
+        rows = (p >= low) & (p < high)
+        if int(rows.sum()) >= FEWEST:
+            evened = x[rows] - slope * (p[rows] - 0.5 * (low + high))
+            level[number] = float(np.mean(evened))
+            error[number] = float(np.std(evened, ddof=1)) / sqrt(int(rows.sum()))
+    return level, error
+
+
+def _over_travel(ramps: Ramps, plate: Nameplate, x_0: float, x_1: float) -> Table:
+    """Return friction at the tenths of the travel."""
+    half = 0.5 * (x_0 + x_1)
+    still = difference(ramps.at_no_rate(1, half), ramps.at_no_rate(-1, half), 0.5)
+    slow = difference(ramps.at_slowest(1, half), ramps.at_slowest(-1, half), 0.5)
+    lag_pa = 0.0 if still.value is None or slow.value is None else slow.value - still.value
+    rows = []
+    for share in DECILES:
+        found = _friction_at(ramps, x_0 + share * (x_1 - x_0), 0.1 * (x_1 - x_0), lag_pa)
+        shown = Quantity("", "", "Pa", found).shown
+        force = "" if plate.area_m2 is None else Quantity("", "", "N", _scaled(found, plate.area_m2)).shown
+        rows.append((f"{100 * share:.0f} %", shown, *((force,) if plate.area_m2 is not None else ())))
+    headings = ("travel", "friction / area", *(("friction",) if plate.area_m2 is not None else ()))
+    return Table(headings, rows, "friction over travel, at the slowest rate less its lag")
+
+
+def _friction_at(ramps: Ramps, middle_m: float, width_m: float, lag_pa: float) -> Figure:
+    """Return the half distance of both directions about a position: of rows taken by the lines' commands."""
+    told: dict[int, tuple[float, float]] = {}
+    for way in (1, -1):
+        means, variances = [], []
+        for line in ramps.slowest(way):
+            p, x = line.leg.command_pa, line.leg.position_m
+            low, high = (line.pressure_pa(middle_m + share * width_m)[0] for share in (-0.5, 0.5))
+            rows = (p >= low) & (p <= high)
+            if int(rows.sum()) >= FEWEST:
+                needed = p[rows] - (x[rows] - middle_m) / line.slope
+                means.append(float(np.mean(needed)))
+                variances.append(float(np.var(needed, ddof=1)) / int(rows.sum()))
+        if not means:
+            return undetermined("too few samples there")
+        told[way] = (float(np.mean(means)), sqrt(sum(variances)) / len(variances))
+    value = 0.5 * (told[1][0] - told[-1][0]) - lag_pa
+    return Figure(value, TWO_SIGMA * 0.5 * hypot(told[1][1], told[-1][1]))
+
+
+def _picture(ramps: Ramps) -> Picture:
+    curves = []
+    for way, name in ((1, "up"), (-1, "down")):
+        lines = ramps.slowest(way)
+        if lines:
+            leg = lines[0].leg
+            curves.append(Curve(name, 1e-3 * leg.command_pa, 1e3 * leg.position_m, points=True))
+    for way, name in ((1, "line up"), (-1, "line down")):
+        for line in ramps.slowest(way)[:1]:
+            p = np.array([np.min(line.leg.command_pa), np.max(line.leg.command_pa)])
+            x = np.clip(line.slope * p + line.level, *np.quantile(line.leg.position_m, (0.02, 0.98)))
+            ends = (x - line.level) / line.slope
+            curves.append(Curve(name, 1e-3 * ends, 1e3 * x))
+    return Picture("command, kPa", "travel, mm", tuple(curves))
