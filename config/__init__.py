@@ -4,7 +4,7 @@ Its files:
 
     valve_file, slave_file, daemon_file           what a person writes: the valve, the simulated slave, the daemon
     drive                                         the names and units of what a force, torque or current moves
-    travel                                        opening and stem: in which direction a position is counted
+    travel, travel_table                          opening and stem, by the action of air; table [travel]
     data_sheet, valve_changes                     a valve file from a data sheet; another with values set by hand
     extended_valve                                a valve file worked out for the controller
     loading, writing, plain_file                  reads such a file; writes a valve's; what may be read at all

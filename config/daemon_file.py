@@ -39,6 +39,7 @@ from config.record_tables import HistoryTable, RecorderTable
 from config.supervision_table import SafetyTable, SupervisionTable
 from config.tls_table import Tls
 from config.travel import ActionWord, Travel
+from config.travel_table import TravelTable
 
 
 def _written(network: object) -> object:
@@ -202,22 +203,33 @@ class LawTable(Schema):
         return self
 
 
+LEAST_DEAD_BAND = 5e-4
+"""Of the stroke: finer is no use to a loop, and wears the packing."""
+
+
 class ControlTable(Schema):
     """Table `[control]`: which law follows the reference, and what it may do."""
 
     law: Annotated[str, AfterValidator(one_of_the_laws)] = DEFAULT_LAW
-    dead_band: Annotated[float, Field(gt=0, le=0.1)] = 5e-4
-    """Error at rest that is left alone, as a fraction of the stroke."""
+    dead_band: Annotated[float, Field(gt=0, le=0.1)] | Literal["auto"] = LEAST_DEAD_BAND
+    """Error at rest that is left alone, as a fraction of the stroke; "auto": by noise and friction as identified."""
     cutoff_low: Annotated[float, Field(gt=0, le=0.25)] | None = None
     """Reference below which the stem is pressed onto its lower stop, as a fraction of the stroke; else it never is."""
     cutoff_high: Annotated[float, Field(ge=0.75, lt=1)] | None = None
     """Reference above which it is pressed onto its upper stop."""
+    cutoff_hysteresis: Annotated[float, Field(ge=0, le=0.1)] = 0.005
+    """How far the reference must come back from a cut-off before the stem is positioned again."""
     excursion_limit: Fraction = 0.2
     """How far the law of slides may take the stem beyond a small move, as a share of the stroke."""
     excursion_interval_s: NonNegative = 0.0
     """Least time between two such excursions."""
     excursion_budget_strokes_per_day: NonNegative = 0.0
     """Travel of the packing that such excursions may cost, beyond that of the moves themselves; 0: no limit."""
+
+    @property
+    def least_dead_band(self) -> float:
+        """The dead band before anything is identified, as a share of the stroke."""
+        return LEAST_DEAD_BAND if self.dead_band == "auto" else self.dead_band
 
 
 class SupervisoryTable(Schema):
@@ -296,6 +308,7 @@ class DaemonFile(Schema):
     experiment: ExperimentTable = ExperimentTable()
     law: LawTable | None = None
     control: ControlTable = ControlTable()
+    travel: TravelTable = TravelTable()
     supervisory: SupervisoryTable = SupervisoryTable()
     recorder: RecorderTable | None = None
     health: HealthTable = HealthTable()

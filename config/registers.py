@@ -98,7 +98,9 @@ def _operable(name: str, address: int, type_: WireType, unit: str, low: float, h
 _LARGEST_PA = 2e6
 
 COMMANDS = (
-    _operable("reference", 0, "float32", "p.u.", 0.0, 1.0, "stem position asked for"),
+    _operable(
+        "reference", 0, "float32", "p.u.", 0.0, 1.0, "opening asked for, or the signal that [travel] makes one of"
+    ),
     _operable("reference_scaled", 2, "uint16", "1e-4 p.u.", 0, 10000, "the same as a whole number"),
     _writable("mode", 3, "uint16", "1", 0, 2, f"{listed(Mode)}; falls to hold on a fault"),
     _writable("eta_1", 4, "uint16", "1", 0, 1, "0 switches the excitation on (state S3); the DCS ends it: 1"),
@@ -117,10 +119,10 @@ STATUS = (
     Register("fault", 101, "uint16", "1", listed(Fault)),
     Register("quality", 102, "uint16", "1", f"of the last measurement: {listed(Quality)}"),
     Register("why", 103, "uint16", "1", f"why not as asked: {listed(InhibitReason)}"),
-    Register("position", 104, "float32", "p.u.", "stem position"),
+    Register("position", 104, "float32", "p.u.", "opening, from the closed end"),
     Register("position_scaled", 106, "int16", "1e-4 p.u.", "the same as a whole number"),
     Register("device_status", 107, "uint16", "1", f"the device's own status word, bits: {listed_bits(DeviceStatus)}"),
-    Register("position_m", 108, "float32", "m", "stem position"),
+    Register("position_m", 108, "float32", "m", "the same times the stroke"),
     Register("pressure", 110, "float32", "Pa", "actuator pressure as measured"),
     Register("command", 112, "float32", "Pa", "pressure command"),
     Register("delta_r", 114, "float32", "p.u.", "last change of the reference, kept until the next"),
@@ -130,6 +132,13 @@ STATUS = (
     Register("emergency", 124, "uint16", "1", "CANopen: error code of the device's last EMCY, 0 when it is over"),
     Register("service", 125, "uint16", "1", f"what the service does: {listed(ServiceState)}"),
     Register("locked_out", 126, "uint16", "1", "1: the local switch locks out all writes but the heartbeat"),
+    Register(
+        "reference_opening", 128, "float32", "p.u.", "opening that the reference asks for: split range, characteristic"
+    ),
+    Register(
+        "position_signal", 130, "float32", "p.u.", "reference that asks for where the stem is: the same backwards"
+    ),
+    Register("dead_band", 132, "float32", "p.u.", "error at rest that is left alone, as in force"),
     Register("restored_agreed", 123, "uint16", "1", "landings since then that agree with it"),
 )
 

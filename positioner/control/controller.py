@@ -26,7 +26,6 @@ from config.codes import (
 from config.quantities import DeviceStatus
 from positioner.control import pressure_path
 from positioner.control.controller_memory import ConsumedRequests, ControllerMemory, Decision
-from positioner.control.cutoffs import HIGH, WITHIN, sent_to_m
 from positioner.control.excitation import NOTHING, ActiveExcitation, climbed, excitation_after
 from positioner.control.identifying import estimates_tested, identify
 from positioner.control.laws.boundary import Law, Seen
@@ -43,6 +42,8 @@ from positioner.control.settings import Settings
 from positioner.control.staircase_excitation import Staircase
 from positioner.control.states import Situation, law_inhibit_reason, state_in
 from positioner.control.supervision import NO_FAULT, SupervisionMemory, supervise, usable
+from positioner.control.travel.course import OnCourse
+from positioner.control.travel.cutoffs import HIGH, WITHIN, sent_to_m
 from positioner.control.valve_knowledge import ValveKnowledge, known
 from positioner.estimation.acceptance import Applied, Ratios
 from positioner.estimation.landings.landing_detector import SlideOutcome
@@ -95,6 +96,7 @@ class Controller:
             path=long_held(held_pa) if settings.valve is not None and settings.valve.inverse.delays else None,
             restoration=Restoration.of(restored, settings.valve),
             cut_off=WITHIN,
+            course=OnCourse.begun(0.0, 0.0),
         )
 
     @property
@@ -152,7 +154,7 @@ def step(now: Now) -> tuple[ControllerMemory, Decision]:
     monitoring, supervision = _supervised(now)
     consumed = _consumed(now, supervision)
     waits = _waits(now, supervision.mode)
-    reference = _reference(now, supervision.mode, consumed, waits=waits)
+    reference, course = _reference(now, supervision.mode, consumed, waits=waits)
     experiment = _experiment(now, supervision)
     excitation, excitation_inhibit, outcome = _excited(now, supervision, reference)
     identifying, found = identify(
@@ -178,7 +180,8 @@ def step(now: Now) -> tuple[ControllerMemory, Decision]:
     held_pa = _held_pa(now, state, supervision)
     cut_off = settings.cutoffs.after(memory.cut_off, reference.value_m) if state in FOLLOWING else WITHIN
     follows = state in FOLLOWING and cut_off == WITHIN
-    law = _law(now, reference, applied.ratios if follows else None, outcome)
+    dead_band_m = _dead_band_m(now, applied)
+    law = _law(now, reference, applied.ratios if follows else None, outcome, dead_band_m)
 
     asked_pa = _asked_pa(now, consumed, supervision, held_pa)
     if asked_pa is None:
@@ -216,6 +219,7 @@ def step(now: Now) -> tuple[ControllerMemory, Decision]:
         alarms=monitoring.holding,
         measured=supervision.position_m is not None,
         cut_off=cut_off,
+        dead_band_m=dead_band_m,
     )
     return ControllerMemory(
         command_pa=command_pa,
@@ -234,6 +238,7 @@ def step(now: Now) -> tuple[ControllerMemory, Decision]:
         path=path,
         restoration=restoration,
         cut_off=cut_off,
+        course=course,
     ), decision
 
 
@@ -326,13 +331,24 @@ def _confirmed(
     return memory, found, restoration
 
 
-def _law(now: Now, reference: Reference, ratios: Ratios | None, outcome: SlideOutcome | None) -> Law:
+def _dead_band_m(now: Now, applied: Applied) -> float:
+    """Return the error at rest that is left alone, m."""
+    settings = now.settings.dead_band
+    if settings.fixed_m is not None:
+        return settings.fixed_m
+    return settings.in_force_m(now.statics.detector.noise_m, now.identification.estimates.breakaway, applied.ratios)
+
+
+def _law(
+    now: Now, reference: Reference, ratios: Ratios | None, outcome: SlideOutcome | None, dead_band_m: float
+) -> Law:
     """Return the law after this sample; its ratios are None where it does not command."""
     seen = Seen(
         sample=now.sample,
         usable=now.stem_m is not None,
         command_pa=now.memory.wanted_pa,
         reference_m=reference.value_m,
+        dead_band_m=dead_band_m,
         direction=1 if reference.delta_m > 0.0 else -1 if reference.delta_m < 0.0 else 0,
         ratios=ratios,
         outcome=outcome,
@@ -497,23 +513,29 @@ def _consumed(now: Now, supervision: SupervisionMemory) -> ConsumedRequests:
     )
 
 
-def _reference(now: Now, mode: Mode, consumed: ConsumedRequests, *, waits: bool) -> Reference:
-    """Return the reference in force. Outside automatic it follows the stem: delta r counts from where the stem is.
+def _reference(now: Now, mode: Mode, consumed: ConsumedRequests, *, waits: bool) -> tuple[Reference, OnCourse]:
+    """Return the reference in force, and its course.
+
+    Outside automatic it follows the stem: delta r counts from where the stem is.
 
     So it does where what is asked for is in force already and the stem is elsewhere: S3 may have taken it there.
     """
-    memory, requests = now.memory, now.requests
+    memory, requests, settings = now.memory, now.requests, now.settings.course
     written = requests.reference_writes != consumed.reference_writes
     start = memory.reference
     stands_m = start.value_m if now.stem_m is None else now.stem_m
     if mode is not AUTOMATIC or memory.supervision.mode is not mode:
         start = Reference(stands_m)
     if mode is not AUTOMATIC or not written or waits:
-        return start
-    reference = start.follow(requests.reference_m)
+        return start, memory.course if settings is None else OnCourse.begun(start.value_m, now.sample.now_s)
+    asked_m, course = requests.reference_m, memory.course
+    if settings is not None:
+        course = settings.after(course, now.sample.now_s, start.value_m, asked_m)
+        asked_m = course.reference_m
+    reference = start.follow(asked_m)
     if reference.delta_m != 0.0 or memory.state is S3:
-        return reference
-    return Reference(stands_m).follow(requests.reference_m)
+        return reference, course
+    return Reference(stands_m).follow(asked_m), course
 
 
 def _held_pa(now: Now, state: State, supervision: SupervisionMemory) -> float:

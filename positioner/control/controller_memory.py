@@ -4,7 +4,6 @@ from dataclasses import dataclass
 from typing import NamedTuple
 
 from config.codes import Fault, InhibitReason, Mode, State
-from positioner.control.cutoffs import WITHIN
 from positioner.control.excitation import ActiveExcitation
 from positioner.control.laws.boundary import Law
 from positioner.control.monitors import MonitorMemory
@@ -13,6 +12,8 @@ from positioner.control.pressure_path import PathMemory
 from positioner.control.reference import Reference
 from positioner.control.restoration import Restoration
 from positioner.control.supervision import SupervisionMemory
+from positioner.control.travel.course import OnCourse
+from positioner.control.travel.cutoffs import WITHIN
 from positioner.estimation.acceptance import Applied
 from positioner.estimation.estimates import Estimates
 from positioner.estimation.landings.static_law import StaticLaw
@@ -49,7 +50,9 @@ class ControllerMemory(NamedTuple):
     """None: nothing is known of a pressure that arrives late."""
     restoration: Restoration
     cut_off: int
-    """The stop onto which the stem is pressed, see `cutoffs`."""
+    """The stop onto which the stem is pressed, see `travel.cutoffs`."""
+    course: OnCourse
+    """Of the reference in force to the one asked for."""
 
 
 class Decision(NamedTuple):
@@ -74,3 +77,5 @@ class Decision(NamedTuple):
     """Whether there was a good measurement since the start."""
     cut_off: int = WITHIN
     """The stop onto which the stem is pressed."""
+    dead_band_m: float = 0.0
+    """Error at rest that is left alone."""

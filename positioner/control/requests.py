@@ -35,6 +35,9 @@ class Requests:
     """The DCS's side of the registers. Everything starts so that nothing moves the valve."""
 
     reference_m: float = 0.0
+    """The stem position that `signal` asks for."""
+    signal: float | None = None
+    """As the DCS wrote it, 0 to 1; None: nobody has."""
     mode: Mode = Mode.HOLD
     eta: Eta = QUIET
     manual_pa: float = 0.0

@@ -8,7 +8,6 @@ from config.codes import Fault
 from config.daemon_file import DaemonFile, LawTable
 from config.extended_valve import ExtendedValve
 from config.supervision_table import FaultActionName
-from positioner.control.cutoffs import HYSTERESIS, Cutoffs
 from positioner.control.laws.boundary import LawSettings
 from positioner.control.laws.by_name import law_named
 from positioner.control.monitors import MonitorSettings
@@ -16,6 +15,9 @@ from positioner.control.permissives import ExcitationLimits
 from positioner.control.played_experiment import ExperimentLimits
 from positioner.control.staircase_excitation import StaircaseLimits
 from positioner.control.supervision import Limits
+from positioner.control.travel.course import Course
+from positioner.control.travel.cutoffs import Cutoffs
+from positioner.control.travel.dead_band import DeadBand
 from positioner.estimation.acceptance import Applied, Ratios
 from positioner.estimation.landings.extended_balance import straight_law
 from positioner.estimation.online import IdentificationSettings
@@ -37,6 +39,9 @@ class Settings:
     """What the law may use before anything was identified."""
     law: LawSettings
     cutoffs: Cutoffs
+    course: Course | None
+    """Of the reference in force to the one asked for; None: at once."""
+    dead_band: DeadBand
     staircase: StaircaseLimits | None
     """Of the excitation by slides; None: it is a sine."""
     experiment: ExperimentLimits
@@ -90,6 +95,8 @@ class Settings:
             applied=Applied(_ratios(file.law) if valve is None else straight_law(valve)),
             law=law_named(file.control.law).of(_within_supply(file, valve)),
             cutoffs=_cutoffs(file),
+            course=Course.of(file),
+            dead_band=_dead_band(file),
             staircase=_staircase(file) if file.by_slides else None,
             experiment=_experiment(file),
             delivered_pa=file.device.delivered_pa,
@@ -133,7 +140,13 @@ def _within_supply(file: DaemonFile, valve: ExtendedValve | None) -> DaemonFile:
 def _cutoffs(file: DaemonFile) -> Cutoffs:
     low, high = file.control.cutoff_low, file.control.cutoff_high
     low_m, high_m = file.valve.travel.window_m((-inf if low is None else low, inf if high is None else high))
-    return Cutoffs(low_m=low_m, high_m=high_m, hysteresis_m=HYSTERESIS * file.valve.stroke_m)
+    return Cutoffs(low_m=low_m, high_m=high_m, hysteresis_m=file.control.cutoff_hysteresis * file.valve.stroke_m)
+
+
+def _dead_band(file: DaemonFile) -> DeadBand:
+    asked, stroke_m = file.control.dead_band, file.valve.stroke_m
+    jumps = not law_named(file.control.law).by_single_steps
+    return DeadBand(stroke_m, None if asked == "auto" else asked * stroke_m, jumps)
 
 
 def _staircase(file: DaemonFile) -> StaircaseLimits:

@@ -29,6 +29,7 @@ from fieldbus.modbus.tls import Guard
 from positioner.control.controller import Controller
 from positioner.control.requests import Requests
 from positioner.control.settings import Settings
+from positioner.control.travel.signal_path import SignalPath
 from positioner.daemon.cycle import Cycle, run_in_turn
 from positioner.daemon.ending import Endings
 from positioner.daemon.first_look import impossible
@@ -93,6 +94,7 @@ class ServedValve:
             state,
             requests,
             self.locked,
+            SignalPath.of(self.file.travel),
         )
 
     def leave(self) -> None:

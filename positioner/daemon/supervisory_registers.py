@@ -40,6 +40,7 @@ from fieldbus.modbus.register_answers import RegisterError, Table
 from fieldbus.modbus.request_counts import RequestCounts
 from positioner.control.controller_memory import Decision
 from positioner.control.requests import Requests
+from positioner.control.travel.signal_path import SignalPath
 from positioner.daemon.backoff import LinesPerPeer
 from positioner.daemon.cycle import Cycle
 from positioner.daemon.cycle_statistics import CycleStatistics
@@ -76,15 +77,17 @@ class SupervisoryRegisters:
         state: Callable[[Decision], ServiceState] = state_by_mode,
         requests: RequestCounts | None = None,
         locked: Callable[[], bool] = lambda: False,
+        path: SignalPath | None = None,
     ) -> None:
         self._cycle = cycle
         self._valve = valve
         self._travel = travel
+        self._path = path or SignalPath()
         self._minimum_pa = minimum_pa
         self._maximum_pa = maximum_pa
         self._heartbeat = 0
         self._lines = LinesPerPeer()
-        self._values = _getters(cycle, travel) | {"service": lambda s, _: state(s.decision)}
+        self._values = _getters(cycle, travel, self._path) | {"service": lambda s, _: state(s.decision)}
         self._values |= site_getters(requests or RequestCounts(), locked)
         self._locked = locked
 
@@ -166,8 +169,12 @@ class SupervisoryRegisters:
         """Return what is asked for after these writes."""
         requests = self._cycle.requests
         if {"reference", "reference_scaled"} & values.keys():
+            signal = _signal(values)
             requests = replace(
-                requests, reference_m=self._reference_m(values), reference_writes=requests.reference_writes + 1
+                requests,
+                signal=signal,
+                reference_m=self._travel.stem_m(self._path.opening(signal)),
+                reference_writes=requests.reference_writes + 1,
             )
         if "mode" in values:
             requests = replace(requests, mode=self._mode(values["mode"]), mode_writes=requests.mode_writes + 1)
@@ -201,13 +208,6 @@ class SupervisoryRegisters:
             omega_rad_per_s=values.get("omega", requests.omega_rad_per_s),
         )
 
-    def _reference_m(self, values: Mapping[str, float]) -> float:
-        scaled = values.get("reference_scaled", math.nan) / SCALE
-        reference = values.get("reference", scaled)
-        if abs(reference - scaled) > 1 / SCALE:
-            raise WriteRejected(ExcCodes.ILLEGAL_VALUE, "reference and reference_scaled disagree in one request")
-        return self._travel.stem_m(reference)
-
     def _mode(self, value: float) -> Mode:
         mode, fault = Mode(int(value)), self._cycle.snapshot.decision.fault
         if mode is not Mode.HOLD and fault is not Fault.NONE:
@@ -225,6 +225,15 @@ class SupervisoryRegisters:
         return value
 
 
+def _signal(values: Mapping[str, float]) -> float:
+    """Return the reference as it was written, in one form or in both."""
+    scaled = values.get("reference_scaled", math.nan) / SCALE
+    reference = values.get("reference", scaled)
+    if abs(reference - scaled) > 1 / SCALE:
+        raise WriteRejected(ExcCodes.ILLEGAL_VALUE, "reference and reference_scaled disagree in one request")
+    return reference
+
+
 Getter = Callable[[Snapshot, Requests], float]
 
 
@@ -235,11 +244,12 @@ def _as_of_now(cycle: Cycle) -> Snapshot:
     return snapshot.stalled() if stands_still else snapshot
 
 
-def _getters(cycle: Cycle, travel: Travel) -> dict[str, Getter]:
+def _getters(cycle: Cycle, travel: Travel, path: SignalPath) -> dict[str, Getter]:
     """Return, by register, what it serves of a snapshot."""
     getters = {
-        **_command_getters(travel),
+        **_command_getters(travel, path),
         **_status_getters(cycle, travel),
+        **_travel_getters(travel, path),
         **_estimate_getters(travel.stroke_m),
         **_statistics_getters(cycle),
         **_identity_getters(),
@@ -252,10 +262,11 @@ def _getters(cycle: Cycle, travel: Travel) -> dict[str, Getter]:
     return getters
 
 
-def _command_getters(travel: Travel) -> dict[str, Getter]:
+def _command_getters(travel: Travel, path: SignalPath) -> dict[str, Getter]:
     def reference(snapshot: Snapshot, requests: Requests) -> float:
-        written = requests.reference_writes > 0
-        return travel.opening(requests.reference_m if written else snapshot.decision.reference_m)
+        if requests.reference_writes > 0 and requests.signal is not None:
+            return requests.signal
+        return path.signal(_asked(travel, snapshot, requests))
 
     return {
         "reference": reference,
@@ -269,6 +280,19 @@ def _command_getters(travel: Travel) -> dict[str, Getter]:
         "alpha": lambda _, r: r.alpha_pa,
         "beta": lambda _, r: r.beta_pa,
         "omega": lambda _, r: r.omega_rad_per_s,
+    }
+
+
+def _asked(travel: Travel, snapshot: Snapshot, requests: Requests) -> float:
+    """Return the opening that is asked for."""
+    return travel.opening(requests.reference_m if requests.reference_writes > 0 else snapshot.decision.reference_m)
+
+
+def _travel_getters(travel: Travel, path: SignalPath) -> dict[str, Getter]:
+    return {
+        "reference_opening": lambda s, r: _asked(travel, s, r),
+        "position_signal": lambda s, _: path.signal(travel.opening(s.sample.position_m)),
+        "dead_band": lambda s, _: s.decision.dead_band_m / travel.stroke_m,
     }
 
 

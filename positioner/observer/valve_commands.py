@@ -109,7 +109,7 @@ class ValveCommands:
             if not abs(asked_pu - seen_pu) <= SAME_PU:
                 now, then = (_as_read("reference", each) for each in (asked_pu, seen_pu))
                 return Confirmation(False, f"nothing was written: the reference is {now} by now, and was {then}")
-            to_pu = seen_pu if goes else min(max(dcs.get("position"), 0.0), 1.0)
+            to_pu = seen_pu if goes else min(max(dcs.get("position_signal"), 0.0), 1.0)
             dcs.set_and_read_back("reference", to_pu)
             return _confirmed("mode", Mode.AUTOMATIC, dcs.set_and_read_back("mode", Mode.AUTOMATIC))
 

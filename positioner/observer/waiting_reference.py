@@ -39,8 +39,8 @@ class Writer:
 
 
 def waiting_reference(values: Mapping[str, float]) -> float | None:
-    """Return the reference, p.u., that automatic will take the stem to, by registers; None if there is none."""
-    asked, stands = values.get("reference", math.nan), values.get("reference_in_force", math.nan)
+    """Return the opening, p.u., that automatic will take the stem to, by registers; None if there is none."""
+    asked, stands = values.get("reference_opening", math.nan), values.get("reference_in_force", math.nan)
     apart = abs(asked - stands)
     waits = math.isfinite(apart) and apart > SAME_PU and values.get("mode") != Mode.AUTOMATIC
     return asked if waits else None

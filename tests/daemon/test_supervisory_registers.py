@@ -18,6 +18,7 @@ from fieldbus.modbus.register_answers import RegisterError
 from fieldbus.modbus.server import RegisterServer
 from positioner import dcs
 from positioner.control.requests import Requests
+from positioner.control.travel.signal_path import SignalPath
 from positioner.daemon.cycle import Cycle
 from positioner.daemon.supervisory_registers import SupervisoryRegisters
 from positioner.virtual.virtual_cycle import virtual_cycle
@@ -42,7 +43,8 @@ class Panel:
         )
         slave = SlaveFile.model_validate({"clock": {"mode": "lockstep"}, "initial": {"position_m": 0.02}})
         self.cycle: Cycle = virtual_cycle(daemon, device_of(slave, shipped_valve("seed")), Requests())
-        self.registers = SupervisoryRegisters(self.cycle, Travel(STROKE_M), 0.0, 200e3)
+        path = SignalPath.of(daemon.travel)
+        self.registers = SupervisoryRegisters(self.cycle, Travel(STROKE_M), 0.0, 200e3, path=path)
 
     def get(self, name: str) -> float:
         register = BY_NAME[name]

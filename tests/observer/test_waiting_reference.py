@@ -10,7 +10,7 @@ from positioner.history import HistoryFile
 from positioner.history.entries import Write
 from positioner.observer.waiting_reference import Writer, reference_writer, waiting_reference
 
-HELD = {"mode": float(Mode.HOLD), "reference": 0.7, "reference_in_force": 0.2}
+HELD = {"mode": float(Mode.HOLD), "reference": 0.7, "reference_opening": 0.7, "reference_in_force": 0.2}
 
 
 @pytest.mark.parametrize(
@@ -19,8 +19,8 @@ HELD = {"mode": float(Mode.HOLD), "reference": 0.7, "reference_in_force": 0.2}
         ({}, 0.7),
         ({"mode": float(Mode.MANUAL)}, 0.7),
         ({"mode": float(Mode.AUTOMATIC)}, None),
-        ({"reference": 0.2}, None),
-        ({"reference": float("nan")}, None),
+        ({"reference_opening": 0.2}, None),
+        ({"reference_opening": float("nan")}, None),
     ],
 )
 def test_it_waits_outside_automatic_where_the_stem_is_elsewhere(changed: dict[str, float], waits: float | None) -> None:

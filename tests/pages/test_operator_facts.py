@@ -130,6 +130,7 @@ def ahead(*, law: str = "seed", file: bool = True, **values: float) -> Ahead:
     tables = {"valve": {"stroke_m": STROKE_M}, "control": {"law": law}}
     settings = DaemonFile.model_validate(tables) if file else None
     asked = {"mode": Mode.HOLD, "position": 0.2, "reference": 0.7, "reference_in_force": 0.2, "omega": 1.0}
+    asked["reference_opening"] = 0.7
     asked |= {"beta": 13238.0, "b_over_c_applied": math.nan, "command": 24000.0}
     writer = Writer("10.0.0.7:4001", "", "", 0.0)
     return Ahead(with_values(**(asked | values)), STROKE_M, Units(), settings, writer)

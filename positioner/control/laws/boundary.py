@@ -31,6 +31,8 @@ class Seen(NamedTuple):
     command_pa: float
     """The last command given."""
     reference_m: float
+    dead_band_m: float
+    """Error at rest that is left alone."""
     direction: int
     """In which the reference changed last: +1 up, -1 down, 0 not yet."""
     ratios: Ratios | None

@@ -15,9 +15,9 @@ from config.codes import Fault, Mode, Ne107Status, Quality, State
 from config.daemon_file import HealthTable
 from config.supervision_table import Ne107Letter, SupervisionTable
 from positioner.control.controller_memory import Decision
-from positioner.control.cutoffs import WITHIN, sent_to_m
 from positioner.control.requests import Requests
 from positioner.control.sample import Sample
+from positioner.control.travel.cutoffs import WITHIN, sent_to_m
 from positioner.daemon.health.health_file import HealthRecord
 from positioner.daemon.health.stiction_index import StictionIndex
 from positioner.daemon.health.travel_accumulator import TravelAccumulator

@@ -220,6 +220,11 @@ class LandingDetector:
         self._known = self._known or self._answered
         return outcome
 
+    @property
+    def noise_m(self) -> float:
+        """Standard deviation of a sample of the position, m, of the rests so far; 0 before there was one."""
+        return self._window.usual_noise_m
+
     def _waited_for(self, time_s: float, rest: Rest) -> bool:
         """Whether a stem that seems to rest has been waited for long enough."""
         precise = rest.std_m <= PRECISE * self._stroke_m or rest.count >= LONG

@@ -155,6 +155,11 @@ class RestWindow:
         """Look at the next sample: the stem has left its rest."""
         self.rest, self._look_s = None, time_s
 
+    @property
+    def usual_noise_m(self) -> float:
+        """Standard deviation of a sample, m, of the rests so far; 0 before there was one."""
+        return 0.0 if self._variance_m2 is None else sqrt(self._variance_m2)
+
     def learn_noise(self, rest: Rest) -> None:
         """Take a rest's noise for that of the rests before."""
         before = rest.noise_m**2 if self._variance_m2 is None else self._variance_m2

@@ -15,9 +15,9 @@ from config.travel import Travel
 from config.valve_file import load_valve, shipped_valve
 from fieldbus.modbus.register_answers import RegisterError
 from positioner.control.controller_memory import Decision
-from positioner.control.cutoffs import LOW
 from positioner.control.requests import Requests
 from positioner.control.sample import Sample
+from positioner.control.travel.cutoffs import LOW
 from positioner.daemon.health import Health, ne107_condition
 from positioner.daemon.health.ne107 import Ne107Condition
 from positioner.daemon.health.valve_health import HealthSettings

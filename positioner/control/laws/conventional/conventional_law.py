@@ -30,7 +30,6 @@ INTEGRAL_RATE_PER_S = 8.0
 class ConventionalSettings:
     """Settings of the law: m, Pa, K and R."""
 
-    dead_band_m: float
     minimum_pa: float
     maximum_pa: float
     gain: float = GAIN
@@ -42,7 +41,7 @@ class ConventionalSettings:
     def of(cls, file: DaemonFile) -> Self:
         """Return what a daemon's file says of the law."""
         pressure = file.pressure
-        return cls(file.control.dead_band * file.valve.stroke_m, pressure.minimum_pa, pressure.maximum_pa)
+        return cls(pressure.minimum_pa, pressure.maximum_pa)
 
     def begin(self, held_pa: float) -> "ConventionalLaw":
         """Return the law under a command, Pa."""
@@ -67,9 +66,9 @@ class ConventionalLaw(Unlearning):
             return ConventionalLaw(seen.command_pa, self.settings)
         if not seen.usable:
             return self
-        return self.after(seen.sample.now_s, seen.reference_m - seen.sample.position_m, seen.ratios)
+        return self.after(seen.sample.now_s, seen.reference_m - seen.sample.position_m, seen.ratios, seen.dead_band_m)
 
-    def after(self, now_s: float, error_m: float, ratios: Ratios) -> "ConventionalLaw":
+    def after(self, now_s: float, error_m: float, ratios: Ratios, dead_band_m: float) -> "ConventionalLaw":
         """Return the law after one good sample of an error, m; the first goes on from the pressure without a bump."""
         settings = self.settings
         error_pa = -ratios.b_over_c * error_m
@@ -77,7 +76,7 @@ class ConventionalLaw(Unlearning):
         if self.integral_pa is None:
             return ConventionalLaw(self.command_pa, settings, self.command_pa - proportional_pa, now_s)
         integral_pa = self.integral_pa
-        if abs(error_m) > settings.dead_band_m:
+        if abs(error_m) > dead_band_m:
             share = min(settings.integral_rate_per_s * (now_s - self.now_s), 1 - 2 * settings.gain)
             integral_pa += share * error_pa
         wanted_pa = proportional_pa + integral_pa

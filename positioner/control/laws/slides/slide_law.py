@@ -39,7 +39,7 @@ class SlideSettings(SlideBounds):
         stroke_m, control = file.valve.stroke_m, file.control
         return cls(
             stroke_m=stroke_m,
-            dead_band_m=control.dead_band * stroke_m,
+            dead_band_m=control.least_dead_band * stroke_m,
             minimum_pa=file.pressure.minimum_pa,
             maximum_pa=file.pressure.maximum_pa,
             breakaway_pa=file.valve.breakaway_pa,
@@ -74,13 +74,15 @@ class SlideLaw:
 
     def observe(self, seen: Seen) -> "SlideLaw":
         """Return the law after one sample."""
-        memory = self.memory
+        memory, settings = self.memory, self.settings
+        if seen.dead_band_m != settings.dead_band_m:
+            settings = replace(settings, dead_band_m=seen.dead_band_m)
         if seen.ratios is None:
-            memory = let_go(memory, seen.command_pa, self.settings)
+            memory = let_go(memory, seen.command_pa, settings)
         elif seen.usable:
-            balance = balance_of(seen.ratios, seen.statics, self.settings.stroke_m, seen.sample.now_s)
-            memory = stepped(memory, observed(seen), seen.reference_m, balance, self.settings)
-        return self if memory is self.memory else SlideLaw(self.settings, memory)
+            balance = balance_of(seen.ratios, seen.statics, settings.stroke_m, seen.sample.now_s)
+            memory = stepped(memory, observed(seen), seen.reference_m, balance, settings)
+        return self if memory is self.memory and settings is self.settings else SlideLaw(settings, memory)
 
     def interrupted_pa(self, command_pa: float) -> float:
         """Return what to hold if something interrupts it after a command, Pa: of two slides the second."""

@@ -13,8 +13,6 @@ from math import inf
 
 LOW, WITHIN, HIGH = -1, 0, 1
 """The stop onto which the stem is pressed; none while it is positioned."""
-HYSTERESIS = 0.005
-"""h as a share of the stroke."""
 
 
 @dataclass(frozen=True, slots=True)

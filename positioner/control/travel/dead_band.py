@@ -1,0 +1,47 @@
+"""The dead band: the error at rest that is left alone.
+
+    d = d_0                                          [control] dead_band = a number
+    d = max(d_least, 3 sigma, j / 2), at most 2 %     [control] dead_band = "auto"
+
+    j = (F_s - F_c) / k_s                            how far the stem jumps when it breaks loose, m
+
+sigma is the noise of the position, of the rests so far. j counts for a law that commands all the while: one that wants
+less than half a jump hunts for ever. A law of single steps places the stem within a jump, and is given sigma alone.
+"""
+
+from dataclasses import dataclass
+
+from config.daemon_file import LEAST_DEAD_BAND
+from positioner.estimation.acceptance import Ratios
+from positioner.estimation.estimates import Estimate
+
+MOST = 0.02
+"""Of the stroke: more is no positioner."""
+DEVIATIONS = 3.0
+"""Of the noise: one sample in 400 lies farther off."""
+HALF = 0.5
+"""Of a jump."""
+
+
+@dataclass(frozen=True, slots=True)
+class DeadBand:
+    """m; `adapts` to what is identified."""
+
+    stroke_m: float
+    fixed_m: float | None = None
+    jumps: bool = False
+    """Whether the law commands all the while, so that a jump counts."""
+
+    def in_force_m(self, noise_m: float, breakaway: Estimate, ratios: Ratios | None) -> float:
+        """Return d, m, by the noise of the position, m, and the friction that are known."""
+        if self.fixed_m is not None:
+            return self.fixed_m
+        jump_m = self._jump_m(breakaway, ratios) if self.jumps else 0.0
+        wanted_m = max(LEAST_DEAD_BAND * self.stroke_m, DEVIATIONS * noise_m, HALF * jump_m)
+        return min(wanted_m, MOST * self.stroke_m)
+
+    @staticmethod
+    def _jump_m(breakaway: Estimate, ratios: Ratios | None) -> float:
+        if ratios is None or not breakaway.valid:
+            return 0.0
+        return max(breakaway.value + ratios.k_over_c, 0.0) / -ratios.b_over_c
