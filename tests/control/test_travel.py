@@ -5,6 +5,7 @@ from itertools import pairwise
 import numpy as np
 import pytest
 
+from config.codes import Refusal
 from config.daemon_file import DaemonFile
 from config.errors import InputError
 from config.loading import validated
@@ -15,7 +16,7 @@ from positioner.control.travel.cutoffs import HIGH, LOW, WITHIN, Cutoffs
 from positioner.control.travel.dead_band import DeadBand
 from positioner.control.travel.signal_path import SignalPath
 from positioner.estimation.acceptance import Ratios
-from positioner.estimation.estimates import Estimate, Refusal, no_estimate
+from positioner.estimation.estimates import Estimate, no_estimate
 from tests.daemon.test_supervisory_registers import Panel
 
 POINTS = [[0.0, 0.02], [0.3, 0.05], [0.31, 0.6], [1.0, 0.98]]

@@ -7,7 +7,7 @@ shuts; this is the same curve moved so that it does.
 """
 
 from dataclasses import dataclass
-from math import log, log1p
+from math import expm1, log, log1p
 
 
 @dataclass(frozen=True, slots=True)
@@ -19,10 +19,10 @@ class EqualPercentage:
     def opening(self, signal: float) -> float:
         """Return h of a signal s, 0 to 1.
 
-        >>> EqualPercentage(49.0).opening(0.5)
+        >>> round(EqualPercentage(49.0).opening(0.5), 12)
         0.125
         """
-        return (self.rangeability**signal - 1.0) / (self.rangeability - 1.0)
+        return expm1(signal * log(self.rangeability)) / (self.rangeability - 1.0)
 
     def signal(self, opening: float) -> float:
         """Return s of an opening h, 0 to 1.
