@@ -79,7 +79,7 @@ def test_a_position_that_is_not_allowed_is_refused_in_what_it_was_typed_in(daemo
 
 
 def test_automatic_goes_where_was_agreed_to_or_stays_where_the_stem_is(daemon: Daemon) -> None:
-    daemon.values |= {"mode": Mode.HOLD, "reference": 0.7, "position": 0.2}
+    daemon.values |= {"mode": Mode.HOLD, "reference": 0.7, "position_signal": 0.2}
     for goes, there in ((True, 0.7), (False, 0.2)):
         daemon.values["reference"] = 0.7
         daemon.writes.clear()

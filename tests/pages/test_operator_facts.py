@@ -146,7 +146,7 @@ def test_before_automatic_it_is_said_how_far_by_what_and_who_wrote_the_reference
     unknown = replace(ahead(file=False), writer=None)
     assert "who wrote it is not known" in unknown.automatic()[0]
     assert "the page was not given the daemon's file" in unknown.automatic()[2]
-    (nothing,) = ahead(reference=0.2).automatic()
+    (nothing,) = ahead(reference_opening=0.2).automatic()
     assert nothing.startswith("The stem stands at 20.00 %. No other reference waits")
 
 

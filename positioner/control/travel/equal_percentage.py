@@ -7,7 +7,7 @@ shuts; this is the same curve moved so that it does.
 """
 
 from dataclasses import dataclass
-from math import expm1, log, log1p
+from math import log, log1p
 
 
 @dataclass(frozen=True, slots=True)
@@ -22,7 +22,7 @@ class EqualPercentage:
         >>> round(EqualPercentage(49.0).opening(0.5), 12)
         0.125
         """
-        return expm1(signal * log(self.rangeability)) / (self.rangeability - 1.0)
+        return float(self.rangeability**signal - 1.0) / (self.rangeability - 1.0)
 
     def signal(self, opening: float) -> float:
         """Return s of an opening h, 0 to 1.
@@ -30,4 +30,4 @@ class EqualPercentage:
         >>> round(EqualPercentage(49.0).signal(0.125), 12)
         0.5
         """
-        return log1p((self.rangeability - 1.0) * opening) / log(self.rangeability)
+        return min(log1p((self.rangeability - 1.0) * opening) / log(self.rangeability), 1.0)

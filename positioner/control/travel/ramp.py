@@ -17,8 +17,8 @@ class Ramp:
     def after(self, before_m: float, target_m: float, lasted_s: float) -> float:
         """Return r after some time, s.
 
-        >>> Ramp(0.001, 0.002).after(0.01, 0.02, 0.5), Ramp(0.001, 0.002).after(0.01, 0.0, 0.5)
-        (0.0105, 0.009)
+        >>> Ramp(0.25, 0.5).after(0.0, 1.0, 0.5), Ramp(0.25, 0.5).after(1.0, 0.0, 0.5)
+        (0.125, 0.75)
         """
         if target_m > before_m:
             return min(target_m, before_m + self.up_m_per_s * lasted_s) if lasted_s > 0.0 else before_m

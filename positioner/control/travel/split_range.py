@@ -18,8 +18,8 @@ class SplitRange:
     def share(self, signal: float) -> float:
         """Return s of a signal w.
 
-        >>> SplitRange(0.5, 1.0).share(0.75), SplitRange(0.5, 1.0).share(0.2), SplitRange(0.5, 0.0).share(0.5)
-        (0.5, 0.0, 0.0)
+        >>> SplitRange(0.5, 1.0).share(0.75), SplitRange(0.5, 1.0).share(0.2), SplitRange(0.5, 0.0).share(0.125)
+        (0.5, 0.0, 0.75)
         """
         return min(max((signal - self.closed) / (self.open - self.closed), 0.0), 1.0)
 
