@@ -185,6 +185,7 @@ class ValveTestVerdict(Code):
     BROKEN_OFF = 11, "broken off"
     UNDETERMINED = 12, "cannot be told"
     CHANGED = 13, "figures have changed since the record it is compared with"
+    SLOW = 14, "slower than the reference"
 
 
 class Refusal(Code):

@@ -25,6 +25,8 @@ COMMANDS = (
     "set",
     "identify",
     "signature",
+    "pst",
+    "cst",
     "discriminate",
     "map",
     "events",

@@ -4,9 +4,11 @@ import argparse
 
 from positioner.cli.parts.valve_test import (
     add_test_arguments,
+    bounds_of,
     checked,
     finished,
     played_all,
+    playing,
     recordings_of,
     require_whole_travel,
 )
@@ -29,16 +31,14 @@ def run(arguments: argparse.Namespace) -> int:
     if arguments.rec:
         recordings = [Recording.read(path) for path in arguments.rec]
     else:
-        from positioner.cli.parts.breaking_off import ended_as_by_ctrl_c
         from positioner.cli.parts.experiment_player import RunningValve, require_ready
-        from positioner.control.settings import Settings
 
         assert file is not None
         require_whole_travel(file, "signature", arguments.config)
         require_ready(file, arguments)
         valve = RunningValve(file, arguments)
-        programs = programmes(Settings.of(file).experiment, valve.command_pa(), str(arguments.config))
-        with ended_as_by_ctrl_c():
+        programs = programmes(bounds_of(file), valve.command_pa(), str(arguments.config))
+        with playing("signature", file, arguments):
             recordings = recordings_of(played_all(valve, programs))
     name = str(arguments.rec[0]) if file is None else file.valve.name
     stroke_m = arguments.stroke_m if file is None else file.valve.stroke_m

@@ -7,6 +7,9 @@ registers, a cycle of the command's own, or virtual time. It needs numpy alone.
     own_cycle                       programs on a cycle that this process turns itself
     ramps                           slow ramps: lines, ends, and what they are at no rate
     signature                       the valve signature: friction, spring rate, bench set, seat load, bands
+    breakout                        where a stem at rest breaks loose, and where it is back
+    partial_stroke, credit          the partial stroke test; the credit that it may claim
+    continuous_stroke               break-away friction in operation, by a command that creeps
     outcome                         figures, verdicts by their codes, picture; how they show themselves
     kept_records                    as found, as left, factory: kept, and what has changed since
 """

@@ -35,6 +35,8 @@ CHANGED = 4.0
 """Deviations: of twenty figures one in a thousand comparisons is off by so much without a change."""
 WORTH = 0.02
 """Of a figure: less than this is no change that anybody acts on, however certain."""
+TREND = 8
+"""Records that a trend shows."""
 MOST_POINTS = 600
 """Of a curve that is kept: more than a picture shows."""
 MEANS: Mapping[str, tuple[str, str]] = {
@@ -178,6 +180,22 @@ def change_table(told: Sequence[Change], since: str) -> Table:
         if each.changed
     ]
     return Table(("figure", "before ", "now ", "deviations", ""), rows, f"changed since the {since}")
+
+
+def trend(told: Sequence[Record], names: Sequence[str]) -> Table:
+    """Return the newest records, a row each: when, as what, the verdict, and figures by their names."""
+    shown = told[-TREND:]
+    texts = {each.name: each.text for record in shown for each in record.outcome.quantities}
+    rows = []
+    for record in shown:
+        figures = {each.name: each for each in record.outcome.quantities}
+        cells = [
+            figures[each].shown if each in figures and figures[each].figure.reason is None else "-" for each in names
+        ]
+        when = datetime.fromtimestamp(record.time_s, UTC)
+        rows.append((f"{when:%Y-%m-%d %H:%M}", *cells, record.kind.replace("_", " "), record.outcome.said))
+    headings = ("UTC", *(texts.get(each, each) + " " for each in names), "", "")
+    return Table(headings, rows, f"the last {len(shown)} of {len(told)}")
 
 
 def _deviations(now: Figure, before: Figure) -> float:

@@ -55,7 +55,7 @@ def require_ready(file: "DaemonFile", arguments: argparse.Namespace) -> None:
             raise CommandFailed("an experiment is under way already: wait for its end, or break it off by a veto")
         least, most = file.experiment.travel_window
         position = float(dcs.get("position"))
-        if not least <= position <= most:
+        if (least > 0.0 and position < least) or (most < 1.0 and position > most):  # 0 and 1 are the stops
             raise CommandFailed(
                 f"the stem is at {position:.3g} of its stroke, outside [experiment] travel_window = "
                 f"[{least:g}, {most:g}]: move it there, by positioner set reference"
@@ -79,6 +79,17 @@ class RunningValve:
         """Return the command in force, Pa."""
         with _dcs(self._arguments) as dcs:
             return float(dcs.get("command"))
+
+    def stem_m(self) -> float:
+        """Return where the stem is, m, as recordings have it: more air, more of it."""
+        with _dcs(self._arguments) as dcs:
+            return self._file.valve.travel.turned_m(float(dcs.get("position_m")))
+
+    def slope_pa_per_m(self) -> float | None:
+        """Return the spring rate over the area that the law works with, Pa/m; None while it knows none."""
+        with _dcs(self._arguments) as dcs:
+            ratio = float(dcs.get("b_over_c_applied"))
+        return -ratio if ratio < 0.0 else None
 
     def play(self, program: "Program") -> "PlayedProgram":
         """Play a program and return what the daemon's recorder has of it."""

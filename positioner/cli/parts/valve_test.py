@@ -1,6 +1,8 @@
 """What the commands of tests on the valve share: their options, the running valve, what becomes of an outcome."""
 
 import argparse
+from collections.abc import Iterator, Sequence
+from contextlib import contextmanager
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
@@ -10,6 +12,8 @@ from positioner.cli.parts.output_files import writable, write_json
 if TYPE_CHECKING:
     from config.daemon_file import DaemonFile
     from config.recording import Recording
+    from positioner.control.played_experiment import ExperimentLimits
+    from positioner.tests_on_the_valve.kept_records import Record
     from positioner.tests_on_the_valve.outcome import Outcome
     from positioner.tests_on_the_valve.program import Played, Player, Program
 
@@ -69,6 +73,13 @@ def checked(arguments: argparse.Namespace) -> "DaemonFile | None":
     return None
 
 
+def bounds_of(file: "DaemonFile") -> "ExperimentLimits":
+    """Return what programs must stay inside: what the daemon permits, less its way to the first command."""
+    from positioner.control.settings import Settings
+
+    return Settings.of(file).experiment
+
+
 def require_whole_travel(file: "DaemonFile", test: str, config: Path) -> None:
     """Refuse a test over the whole travel where the window keeps the stem off its ends.
 
@@ -98,6 +109,46 @@ def played_all(player: "Player", programs: "tuple[Program, ...]") -> "list[Playe
     return played
 
 
+@contextmanager
+def playing(test: str, file: "DaemonFile", arguments: argparse.Namespace) -> Iterator[None]:
+    """Keep a record of a test that is broken off by Ctrl-C, by what ends a command, or by a daemon that is gone.
+
+    Raises:
+        KeyboardInterrupt, CommandFailed: what broke it off.
+    """
+    from config.codes import ValveTestVerdict
+    from config.errors import CommandFailed
+    from positioner.cli.parts.breaking_off import ended_as_by_ctrl_c
+    from positioner.tests_on_the_valve.outcome import Outcome
+
+    with ended_as_by_ctrl_c():
+        try:
+            yield
+        except (KeyboardInterrupt, CommandFailed) as error:
+            why = str(error) or "by Ctrl-C, or what ended this command"
+            kept(Outcome(test, file.valve.name, (), (ValveTestVerdict.BROKEN_OFF,), (why,)), file, arguments, "")
+            raise
+
+
+def reference_of(test: str, file: "DaemonFile", arguments: argparse.Namespace) -> "Record | None":
+    """Return the record that a test is compared with; None without one.
+
+    Raises:
+        InputError: one was asked for, and there is none.
+    """
+    from positioner.tests_on_the_valve.kept_records import baseline
+
+    return baseline(records_folder(file, arguments.config), test, arguments.against)
+
+
+def trend_of(test: str, names: Sequence[str], file: "DaemonFile", arguments: argparse.Namespace) -> str:
+    """Return the last tests of this kind as text, a row each."""
+    from config.results.block import as_text
+    from positioner.tests_on_the_valve.kept_records import records, trend
+
+    return "\n" + as_text([trend(records(records_folder(file, arguments.config), test), names)])
+
+
 def recordings_of(played: "list[Played]") -> "list[Recording]":
     """Return the recordings of what was played to its end.
 
@@ -112,34 +163,51 @@ def recordings_of(played: "list[Played]") -> "list[Recording]":
     return [each.recording for each in played if each.recording is not None]
 
 
-def finished(outcome: "Outcome", file: "DaemonFile | None", arguments: argparse.Namespace) -> int:
-    """Compare, keep, print and draw an outcome; 0 if it passed, else 1."""
+def finished(
+    outcome: "Outcome",
+    file: "DaemonFile | None",
+    arguments: argparse.Namespace,
+    *,
+    compared: bool = True,
+    always_kept: bool = False,
+) -> int:
+    """Compare, keep, print and draw an outcome; 0 if it passed, else 1.
+
+    Args:
+        outcome: of the test.
+        file: the daemon's; None where only recordings were given.
+        arguments: of the command.
+        compared: whether figures are compared with the record before; else the test has done so by its own limits.
+        always_kept: whether each is kept, asked for or not, as a trend needs it.
+    """
+    changed: list[Any] = []
+    if file is not None and compared:
+        outcome, changed = _compared(outcome, reference_of(outcome.test, file, arguments))
+    print(outcome.summary())
+    if arguments.json is not None:
+        write_json(arguments.json, outcome.as_json() | {"compared": [_change(each) for each in changed]}, indent=1)
+    if arguments.picture is not None:
+        draw(outcome, arguments.picture)
+    if file is not None and (arguments.keep is not None or always_kept):
+        path = kept(outcome, file, arguments, arguments.keep or "")
+        print(f"kept{'' if arguments.keep is None else f' as {arguments.keep}'.replace('_', ' ')}: {path}")
+    return 0 if outcome.passed else 1
+
+
+def _compared(outcome: "Outcome", before: "Record | None") -> "tuple[Outcome, list[Any]]":
     from dataclasses import replace
 
     from config.codes import ValveTestVerdict
-    from positioner.tests_on_the_valve.kept_records import baseline, change_table, changes
+    from positioner.tests_on_the_valve.kept_records import change_table, changes
 
-    compared: list[Any] = []
-    if file is not None:
-        before = baseline(records_folder(file, arguments.config), outcome.test, arguments.against)
-        if before is not None:
-            compared = changes(outcome, before.outcome)
-            if any(each.changed for each in compared):
-                others = tuple(each for each in outcome.verdicts if each is not ValveTestVerdict.PASSED)
-                table = change_table(compared, before.told)
-                outcome = replace(
-                    outcome, verdicts=(*others, ValveTestVerdict.CHANGED), tables=(*outcome.tables, table)
-                )
-            else:
-                outcome = replace(outcome, notes=(*outcome.notes, f"nothing has changed since the {before.told}"))
-    print(outcome.summary())
-    if arguments.json is not None:
-        write_json(arguments.json, outcome.as_json() | {"compared": [_change(each) for each in compared]}, indent=1)
-    if arguments.picture is not None:
-        draw(outcome, arguments.picture)
-    if file is not None and arguments.keep is not None:
-        print(f"kept as {arguments.keep.replace('_', ' ')}: {kept(outcome, file, arguments)}")
-    return 0 if outcome.passed else 1
+    if before is None:
+        return outcome, []
+    told = changes(outcome, before.outcome)
+    if not any(each.changed for each in told):
+        return replace(outcome, notes=(*outcome.notes, f"nothing has changed since the {before.told}")), told
+    others = tuple(each for each in outcome.verdicts if each is not ValveTestVerdict.PASSED)
+    tables = (*outcome.tables, change_table(told, before.told))
+    return replace(outcome, verdicts=(*others, ValveTestVerdict.CHANGED), tables=tables), told
 
 
 def records_folder(file: "DaemonFile", config: Path) -> Path:
@@ -150,14 +218,14 @@ def records_folder(file: "DaemonFile", config: Path) -> Path:
     return folder_of(beside if file.history is None else beside / file.history.folder, file.valve.name)
 
 
-def kept(outcome: "Outcome", file: "DaemonFile", arguments: argparse.Namespace) -> Path:
-    """Keep an outcome with what was configured, and return its file."""
+def kept(outcome: "Outcome", file: "DaemonFile", arguments: argparse.Namespace, kind: str) -> Path:
+    """Keep an outcome as a kind, with what was configured, and return its file."""
     import time
 
     from positioner.tests_on_the_valve.kept_records import keep
 
     tables = file.model_dump(mode="json", include={"valve", "device", "pressure", "experiment", "law", "control"})
-    return keep(records_folder(file, arguments.config), outcome, arguments.keep or "", time.time(), tables)
+    return keep(records_folder(file, arguments.config), outcome, kind, time.time(), tables)
 
 
 def draw(outcome: "Outcome", path: Path) -> None:

@@ -1,0 +1,35 @@
+"""`positioner cst`: the continuous stroke test, break-away friction of a valve in operation."""
+
+import argparse
+
+from positioner.cli.parts.valve_test import add_test_arguments, bounds_of, checked, finished, played_all, playing
+
+HELP = "break-away friction in operation: the command creeps until the stem moves, and back (moves it: state S3)"
+EXAMPLE = "positioner cst site.toml --rate 0.0005"
+
+
+def add_arguments(parser: argparse.ArgumentParser) -> None:
+    """Declare the command line."""
+    add_test_arguments(parser, recordings=False)
+    parser.add_argument("--start", type=float, default=0.003, metavar="SHARE", help="motion that ends it (0.003)")
+    parser.add_argument("--most", type=float, default=0.02, metavar="SHARE", help="motion that breaks it off (0.02)")
+    parser.add_argument("--rate", type=float, default=5e-4, metavar="PER_S", help="of the command's range (0.0005)")
+
+
+def run(arguments: argparse.Namespace) -> int:
+    """Creep up and down; print what friction is; 0 if it passed, else 1."""
+    from positioner.cli.parts.experiment_player import RunningValve, require_ready
+    from positioner.tests_on_the_valve.continuous_stroke import TEST, ContinuousStroke, continuous_stroke, programme
+
+    file = checked(arguments)
+    assert file is not None
+    asked = ContinuousStroke(arguments.start, arguments.most, arguments.rate)
+    asked.require_possible()
+    require_ready(file, arguments)
+    valve, bounds, stroke_m = RunningValve(file, arguments), bounds_of(file), file.valve.stroke_m
+    start_pa = valve.command_pa()
+    programs = tuple(programme(asked, bounds, start_pa, stroke_m, way) for way in (1, -1))
+    with playing(TEST, file, arguments):
+        played = played_all(valve, programs)
+    outcome = continuous_stroke(played, asked, file.valve.name, stroke_m, valve.slope_pa_per_m())
+    return finished(outcome, file, arguments)

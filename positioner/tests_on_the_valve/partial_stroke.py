@@ -1,0 +1,311 @@
+"""The partial stroke test: the stem is moved by a part of its travel and brought back, to see that it still can.
+
+    held        the command in force, 2 s: where the stem rests, and its noise
+    out         a ramp of the command towards the threshold, slow, or as fast as the rate limit permits ("step")
+    turn        where the stem has gone by the travel asked for: the way so far, backwards
+    held        2 s
+
+Abort: beyond the band about the start (travel and `beyond`), by the travel window, by the time limit, by the DCS
+(consent, veto, mode); the way back is the experiment's. Limits come from a reference that was kept:
+
+    friction high, low      friction over the reference's, beyond `[health] friction_high`, `friction_low`; where either
+                            has none, break-out over the reference's, if both began under the same command
+    slow                    time from the break-out to the travel over the reference's, above `SLOW`
+
+each beyond its own +-. Break-out is counted from the command in force: a stem that is pressed onto its stop needs more.
+"""
+
+from collections.abc import Iterator
+from dataclasses import dataclass
+from math import hypot, sqrt
+
+import numpy as np
+
+from config.codes import ExperimentState, ValveTestVerdict
+from config.errors import InputError
+from config.recording import Recording
+from positioner.response.figure import Figure, undetermined
+from positioner.tests_on_the_valve.breakout import (
+    HELD_S,
+    Breakout,
+    Rest,
+    breakout,
+    farthest,
+    rest_after,
+    rest_before,
+    tolerance_m,
+)
+from positioner.tests_on_the_valve.outcome import Curve, Outcome, Picture, Quantity
+from positioner.tests_on_the_valve.program import PLAYED, Bounds, Leap, Played, Program, ramped
+
+TEST = "partial stroke test"
+RAMP_S = 60.0
+"""From the least command to the most, where nobody says how fast."""
+SLOW = 1.5
+"""Of the reference's time to the travel."""
+AT_AN_END = 0.02
+"""Of the stroke: a stem so near an end is pressed onto it, and has to be back there after the test."""
+SAME_COMMAND = 0.02
+"""Of it: commands before two tests that differ by more are not the same."""
+INNER = (0.2, 0.8)
+"""Of the travel, where friction is taken from both ways."""
+FEWEST = 4
+"""Samples of each way for friction."""
+
+
+@dataclass(frozen=True, slots=True)
+class PartialStroke:
+    """What is asked for: shares of the stroke, Pa.
+
+    Attributes:
+        travel: how far the stem is moved.
+        beyond: how much farther it may go before the test is broken off.
+        least: how far it must go at the least to pass.
+        start: motion that counts as a break-out.
+        opening: whether towards more pressure; None: away from the nearer end of the travel.
+        fast: a step, as fast as the rate limit permits, in place of a ramp.
+        threshold_pa: the command is never taken beyond; None: to the limit of the experiments.
+    """
+
+    travel: float = 0.1
+    beyond: float = 0.05
+    least: float = 0.08
+    start: float = 0.005
+    opening: bool | None = None
+    fast: bool = False
+    threshold_pa: float | None = None
+
+    def require_possible(self) -> None:
+        """Refuse what cannot be.
+
+        Raises:
+            InputError: names the option, the value and what is allowed.
+        """
+        for option, value, low, high in (
+            ("--travel", self.travel, 0.01, 0.5),
+            ("--beyond", self.beyond, 0.005, 0.5),
+            ("--least", self.least, 0.0, self.travel),
+            ("--start", self.start, 1e-4, 0.5 * self.travel),
+        ):
+            if not low <= value <= high:
+                raise InputError(option, f"allowed is {low:g} to {high:g} of the stroke, got {value:g}")
+
+
+def programme(
+    asked: PartialStroke,
+    bounds: Bounds,
+    start_pa: float,
+    stem_m: float,
+    stroke_m: float,
+    source: str = "experiment",
+) -> Program:
+    """Return the program of the test.
+
+    Raises:
+        InputError: the threshold is not between the command and its limit, or the time limit is too short.
+    """
+    asked.require_possible()
+    opening = stem_m < 0.5 * stroke_m if asked.opening is None else asked.opening
+    limit_pa = bounds.maximum_pa if opening else bounds.minimum_pa
+    threshold_pa = limit_pa if asked.threshold_pa is None else asked.threshold_pa
+    way = 1.0 if opening else -1.0
+    if not 0.0 < way * (threshold_pa - start_pa) <= way * (limit_pa - start_pa):
+        raise InputError(
+            "--threshold-pa",
+            f"allowed is beyond the command in force, {start_pa:g} Pa, up to the limit {limit_pa:g} Pa, "
+            f"got {threshold_pa:g}",
+        )
+    rate = bounds.rate_pa_per_s if asked.fast else (bounds.maximum_pa - bounds.minimum_pa) / RAMP_S
+    spare_s = 2.0 * HELD_S
+    needed_s = abs(threshold_pa - start_pa) / rate + spare_s
+    if needed_s > bounds.longest_s:
+        rate = min(bounds.rate_pa_per_s, abs(threshold_pa - start_pa) / max(1e-3, 0.95 * bounds.longest_s - spare_s))
+    if abs(threshold_pa - start_pa) / rate + spare_s > bounds.longest_s:
+        raise InputError(source, f"experiment.limit_s: this test needs {needed_s:.3g} s, got {bounds.longest_s:g}")
+    leaps = (Leap(start_pa, HELD_S), Leap(threshold_pa, 0.0))
+    turn_m = asked.travel * stroke_m
+    return ramped(TEST, start_pa, leaps, rate, turn_m=turn_m, band_m=turn_m + asked.beyond * stroke_m)
+
+
+def partial_stroke(
+    played: Played,
+    asked: PartialStroke,
+    valve: str,
+    stroke_m: float,
+    reference: Outcome | None = None,
+    friction_limits: tuple[float, float] = (0.5, 1.5),
+) -> Outcome:
+    """Return what a test came to.
+
+    Args:
+        played: the recording, and what became of the experiment.
+        asked: what was asked for.
+        valve: its name.
+        stroke_m: its stroke.
+        reference: a test of the same kind that was kept.
+        friction_limits: over the reference, low and high; 0 is no limit.
+    """
+    recording = played.recording
+    rest = None if recording is None else rest_before(recording)
+    broken_off = [] if played.state in PLAYED else [_abort(played.state)]
+    if recording is None or rest is None:
+        verdict = broken_off or [ValveTestVerdict.UNDETERMINED]
+        why = played.problem or "too few samples of the rest before it"
+        return Outcome(TEST, valve, (), tuple(verdict), (why,))
+    tolerance = tolerance_m(asked.start * stroke_m, rest)
+    found = breakout(recording, rest, tolerance)
+    travel = farthest(recording, rest)
+    quantities = _figures(recording, rest, found, travel, asked, stroke_m, played.state)
+    verdicts = [
+        *broken_off,
+        *_verdicts(rest, found, travel, asked, stroke_m, tolerance, played.state, rest_after(recording)),
+    ]
+    notes = [f"broken off: {played.problem}"] if broken_off else []
+    if tolerance > asked.start * stroke_m:
+        notes.append(f"the noise makes {1e3 * tolerance:.3g} mm of the start tolerance")
+    after = rest_after(recording)
+    if after is not None and not broken_off and abs(after.position_m - rest.position_m) > tolerance:
+        notes.append("the stem is not quite where it was: friction holds it, and the law takes it back")
+    if reference is None:
+        notes.append("no reference: friction and times are not judged; --keep as_left makes this one the reference")
+    else:
+        verdicts += list(_against({each.name: each.figure for each in quantities}, reference, friction_limits))
+    return Outcome(
+        TEST,
+        valve,
+        tuple(quantities),
+        tuple(dict.fromkeys(verdicts)) or (ValveTestVerdict.PASSED,),
+        tuple(notes),
+        picture=_picture(recording),
+    )
+
+
+def _abort(state: ExperimentState) -> ValveTestVerdict:
+    beyond = state in (ExperimentState.BEYOND_BAND, ExperimentState.OUTSIDE_WINDOW)
+    return ValveTestVerdict.TRAVEL_EXCEEDED if beyond else ValveTestVerdict.BROKEN_OFF
+
+
+def _verdicts(
+    rest: Rest,
+    found: Breakout | None,
+    travel: Figure,
+    asked: PartialStroke,
+    stroke_m: float,
+    tolerance: float,
+    state: ExperimentState,
+    after: Rest | None,
+) -> Iterator[ValveTestVerdict]:
+    if abs(rest.creep_m) > tolerance:
+        yield ValveTestVerdict.DEVIATION
+    if found is None:
+        if state is ExperimentState.COMPLETE:
+            yield ValveTestVerdict.NOT_MOVED
+        return
+    if state is ExperimentState.COMPLETE:
+        yield ValveTestVerdict.PRESSURE_THRESHOLD
+    if travel.value is not None and travel.value < asked.least * stroke_m:
+        yield ValveTestVerdict.TRAVEL_NOT_REACHED
+    if travel.value is not None and travel.value > (asked.travel + asked.beyond) * stroke_m:
+        yield ValveTestVerdict.TRAVEL_EXCEEDED
+    at_an_end = not AT_AN_END * stroke_m < rest.position_m < (1.0 - AT_AN_END) * stroke_m
+    if at_an_end and after is not None and abs(after.position_m - rest.position_m) > tolerance:
+        yield ValveTestVerdict.NOT_SEATED
+
+
+def _figures(
+    recording: Recording,
+    rest: Rest,
+    found: Breakout | None,
+    travel: Figure,
+    asked: PartialStroke,
+    stroke_m: float,
+    state: ExperimentState,
+) -> list[Quantity]:
+    still = undetermined("the stem did not break loose")
+    time_s, command_pa = recording.time_s, recording.command_pa
+    begins = max(0, rest.rows - 1)
+    gap_s = float(np.median(np.diff(time_s)))
+    out_pa, out_s, within = still, still, still
+    if found is not None:
+        out_pa = Figure(abs(found.command_pa - float(command_pa[begins])), found.plus_minus_pa)
+        out_s = Figure(found.time_s - float(time_s[begins]), gap_s)
+        within = _time_to(recording, rest, found, asked.travel * stroke_m, gap_s, state)
+    after = rest_after(recording)
+    unrested = undetermined("broken off, or too few samples of the rest after it")
+    off = unrested
+    if after is not None and state in PLAYED:
+        off = Figure(after.position_m - rest.position_m, hypot(after.error_m, rest.error_m))
+    return [
+        Quantity("command_pa", "command in force before it", "Pa", Figure(float(command_pa[0]))),
+        Quantity("start_m", "where the stem rested", "m", Figure(rest.position_m, rest.error_m)),
+        Quantity("breakout_pa", "break-out, from the command in force", "Pa", out_pa),
+        Quantity("breakout_s", "time to the break-out", "s", out_s),
+        Quantity("travel_m", "travel reached", "m", travel, asked.travel * stroke_m),
+        Quantity("stroke_s", "time from the break-out to the travel", "s", within),
+        Quantity("friction_pa", "friction over the area, lag and all", "Pa", _friction(recording, rest, travel, state)),
+        Quantity("back_m", "back at, from where it was", "m", off),
+        Quantity("noise_m", "noise at rest", "m", Figure(rest.noise_m)),
+    ]
+
+
+def _time_to(
+    recording: Recording, rest: Rest, found: Breakout, travel_m: float, gap_s: float, state: ExperimentState
+) -> Figure:
+    if state is not ExperimentState.TURNED:
+        return undetermined("the travel was not reached")
+    gone = found.way * (recording.position_m - rest.position_m)
+    reached = np.flatnonzero(gone[found.row :] >= travel_m - rest.noise_m)
+    if not reached.size:
+        return undetermined("the travel was not reached")
+    return Figure(float(recording.time_s[found.row + int(reached[0])]) - found.time_s, 2.0 * gap_s)
+
+
+def _friction(recording: Recording, rest: Rest, travel: Figure, state: ExperimentState) -> Figure:
+    """Return the half distance of the commands on both ways through the inner part of the travel."""
+    if state is not ExperimentState.TURNED or travel.value is None:
+        return undetermined("the stem was not moved there and back")
+    p, gone = recording.command_pa, np.abs(recording.position_m - rest.position_m)
+    turn = int(np.argmax(np.abs(p - p[0])))
+    inside = (gone > INNER[0] * travel.value) & (gone < INNER[1] * travel.value)
+    rows = np.arange(len(p))
+    ways = [p[inside & (rows <= turn) & (rows >= rest.rows)], p[inside & (rows > turn)]]
+    if min(map(len, ways)) < FEWEST:
+        return undetermined("too few samples of both ways: a slower ramp has more")
+    apart = abs(float(np.mean(ways[0]) - np.mean(ways[1])))
+    error = sqrt(sum(float(np.var(each, ddof=1)) / len(each) for each in ways))
+    return Figure(0.5 * apart, error)
+
+
+def _against(now: dict[str, Figure], reference: Outcome, limits: tuple[float, float]) -> Iterator[ValveTestVerdict]:
+    low, high = limits
+    then = {each.name: each.figure for each in reference.quantities}
+    for name in _judged(now, then):
+        figure, was = now[name], then[name].value
+        assert figure.value is not None
+        assert was is not None
+        if high and figure.value - (figure.plus_minus or 0.0) > high * was:
+            yield ValveTestVerdict.FRICTION_HIGH
+        if low and figure.value + (figure.plus_minus or 0.0) < low * was:
+            yield ValveTestVerdict.FRICTION_LOW
+    figure, was = now["stroke_s"], then.get("stroke_s", undetermined("")).value
+    if figure.value is not None and was and figure.value - (figure.plus_minus or 0.0) > SLOW * was:
+        yield ValveTestVerdict.SLOW
+
+
+def _judged(now: dict[str, Figure], then: dict[str, Figure]) -> Iterator[str]:
+    """Yield by which figure friction is judged: none where no figure of both can be compared."""
+
+    def both(name: str) -> bool:
+        return bool(now[name].value is not None and name in then and then[name].value)
+
+    if both("friction_pa"):
+        yield "friction_pa"
+    elif both("breakout_pa") and both("command_pa"):
+        before, after = then["command_pa"].value or 0.0, now["command_pa"].value or 0.0
+        if abs(after - before) <= SAME_COMMAND * max(abs(before), abs(after)):
+            yield "breakout_pa"
+
+
+def _picture(recording: Recording) -> Picture:
+    curve = Curve("there and back", 1e-3 * recording.command_pa, 1e3 * recording.position_m)
+    return Picture("command, kPa", "travel, mm", (curve,))
