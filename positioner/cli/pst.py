@@ -26,22 +26,25 @@ DAYS_A_YEAR = 365.25
 def add_arguments(parser: argparse.ArgumentParser) -> None:
     """Declare the command line."""
     add_test_arguments(parser, recordings=False)
-    share = {"type": float, "metavar": "SHARE"}
-    parser.add_argument("--travel", default=0.1, help="how far it is moved, of the stroke (0.1)", **share)
-    parser.add_argument("--beyond", default=0.05, help="how much farther, before it is broken off (0.05)", **share)
-    parser.add_argument("--least", help="how far it must go to pass (0.8 of --travel)", **share)
-    parser.add_argument("--start", default=0.005, help="motion that counts as a break-out (0.005)", **share)
+    _add_share(parser, "--travel", 0.1, "how far it is moved, of the stroke (0.1)")
+    _add_share(parser, "--beyond", 0.05, "how much farther, before it is broken off (0.05)")
+    _add_share(parser, "--least", None, "how far it must go to pass (0.8 of --travel)")
+    _add_share(parser, "--start", 0.005, "motion that counts as a break-out (0.005)")
     parser.add_argument("--towards", choices=("open", "closed"), help="which way (away from the nearer end)")
     parser.add_argument("--step", action="store_true", help="as fast as the rate limit permits, in place of a ramp")
     parser.add_argument("--threshold-pa", type=float, metavar="PA", help="the command is never taken beyond")
     parser.add_argument(
         "--failure-rate-per-h", type=float, metavar="RATE", help="dangerous undetected: says the credit"
     )
-    parser.add_argument("--partial-coverage", default=0.6, help="of these failures it shows (0.6)", **share)
-    parser.add_argument("--proof-coverage", default=0.9, help="of them the proof test shows (0.9)", **share)
+    _add_share(parser, "--partial-coverage", 0.6, "of these failures it shows (0.6)")
+    _add_share(parser, "--proof-coverage", 0.9, "of them the proof test shows (0.9)")
     parser.add_argument("--every-days", type=float, default=30.0, metavar="DAYS", help="how often this is done (30)")
     parser.add_argument("--proof-every-years", type=float, default=5.0, metavar="YEARS", help="the proof test (5)")
     parser.add_argument("--life-years", type=float, default=20.0, metavar="YEARS", help="of the valve (20)")
+
+
+def _add_share(parser: argparse.ArgumentParser, option: str, default: float | None, text: str) -> None:
+    parser.add_argument(option, type=float, default=default, metavar="SHARE", help=text)
 
 
 def run(arguments: argparse.Namespace) -> int:

@@ -134,7 +134,7 @@ def test_a_veto_breaks_it_off_and_the_command_before_comes_back() -> None:
             assert valve.cycle.snapshot.decision.experiment.commands
             vetoed(valve.cycle)
 
-    valve._turn = vetoing  # type: ignore[method-assign]
+    valve._turn = vetoing
     played = valve.play(program_for(valve, PartialStroke()))
     outcome = partial_stroke(played, PartialStroke(), "FV-1", STROKE_M)
     assert outcome.verdicts == (V.BROKEN_OFF,)
@@ -155,7 +155,7 @@ def test_the_travel_is_kept_within_band_and_speed(fast: bool) -> None:
         turn()
         farthest_m = max(farthest_m, abs(valve.device.stem_m - begun_m))
 
-    valve._turn = watched  # type: ignore[method-assign]
+    valve._turn = watched
     outcome = outcome_of(valve, asked)
     assert outcome.verdicts == (V.PASSED,)
     speed = (20e3 if fast else 140e3 / 60.0) / SLOPE
