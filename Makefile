@@ -84,8 +84,7 @@ docs: $(READY)          ## the documents' pictures and figures, made anew
 	$(BIN)/python -m docs.page_pictures docs/img
 	$(BIN)/python -m docs.code_tables
 	$(BIN)/python -m sim.effects docs/effects.md
-	$(BIN)/python docs/notebook.py docs/tutorial.md docs/recordings.md docs/valve-file.md
-	[ ! -d ../shared/data ] || MEASURED="$(abspath ../shared/data)" $(BIN)/python docs/notebook.py docs/slow-data.md
+	$(BIN)/python docs/notebook.py docs/tutorial.md docs/slow-data.md docs/recordings.md docs/valve-file.md
 
 clean:
 	rm -rf $(VENV) .mypy_cache .ruff_cache .pytest_cache demo-out build dist

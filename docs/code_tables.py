@@ -30,8 +30,8 @@ TABLES_BEGIN = "<!-- tables: written by `python -m docs.code_tables` -->"
 TABLES_END = "<!-- end of the tables -->"
 HEAD = """# What the numbers say
 
-Written by `python -m docs.code_tables` from `config/codes.py`, from which `positioner map` has its texts, too. A number
-never gets a new meaning.
+For who programs a DCS: after this page you can say what each number of a register means. A number never gets a new
+meaning. Written by `python -m docs.code_tables` from `config/codes.py`.
 """
 SERVED: dict[type[Code], str] = {code: register for register, code in CODES.items()} | {
     Refusal: "*_reason, refusal",
@@ -49,8 +49,8 @@ def codes() -> str:
 
 def _section(code: type[Code], register: str) -> str:
     said = (code.__doc__ or "").strip().partition("\n")[0]
-    rows = [f"| {int(each)} | `{each.name}` | {each.text} |" for each in code]
-    return "\n".join([f"## {code.__name__}: register {register}", "", said, "", "| | | |", "|---|---|---|", *rows, ""])
+    rows = [f"- {int(each)} `{each.name}`: {each.text}" for each in code]
+    return "\n".join([f"## {code.__name__}: register {register}", "", said, "", *rows, ""])
 
 
 def renewed(document: str) -> str:

@@ -19,8 +19,8 @@ def catalogue() -> str:
     """Return the catalogue, in the order of the path from command to indication."""
     effects = [shipped_effect(name, "catalogue") for name in shipped_effects()]
     along = sorted(effects, key=lambda each: [*PLACES].index(each.places[0]))
-    rows = [f"| `{each.name}` | {', '.join(each.places)} | {each.text} |" for each in along]
-    overview = "\n".join(["| effect | place | what it is |", "|---|---|---|", *rows])
+    by_place = [(place, [each.name for each in along if each.places[0] == place]) for place in PLACES]
+    overview = "\n".join(f"- {place}: {', '.join(f'`{name}`' for name in names)}" for place, names in by_place if names)
     return "\n\n".join([overview, *("\n\n".join(_section(each)) for each in along)])
 
 
@@ -43,24 +43,19 @@ def _section(effect: Effect) -> Iterator[str]:
     yield f"### {effect.name}"
     yield effect.text
     yield f"```\n{effect.equation}\n```"
-    head = ["| parameter | unit | what it is | from | to | vanishes at |", "|---|---|---|---|---|---|"]
-    yield "\n".join([*head, *(_row(key, each) for key, each in effect.parameters.items())])
+    yield "\n".join(_line(key, each) for key, each in effect.parameters.items())
     yield f"In a record: {effect.looks}"
-    yield "\n".join(
-        [
-            "Confounded with:",
-            *(
-                f"- `{name}`: {apart or 'no record of pressure and position tells them apart'}"
-                for name, apart in effect.confounded.items()
-            ),
-        ]
-    )
+    apart = [
+        f"- `{name}`: {told or 'no record of pressure and position tells them apart'}"
+        for name, told in effect.confounded.items()
+    ]
+    yield "\n".join(["Confounded with:", *apart])
 
 
-def _row(key: str, parameter: Parameter) -> str:
-    off = "" if parameter.off is None else f"{parameter.off:g}"
-    text = f"{parameter.text} (given, not fitted)" if parameter.given else parameter.text
-    return f"| `{key}` | {unit(key)} | {text} | {parameter.least:g} | {parameter.most:g} | {off} |"
+def _line(key: str, parameter: Parameter) -> str:
+    given = ", given, not fitted" if parameter.given else ""
+    off = "" if parameter.off is None else f"; {parameter.off:g} is none"
+    return f"- `{key}`, {unit(key)}{given}: {parameter.text}; {parameter.least:g} to {parameter.most:g}{off}"
 
 
 if __name__ == "__main__":

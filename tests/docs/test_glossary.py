@@ -1,4 +1,4 @@
-"""The glossary: each term in one sentence, with a source that is spelt out and a place in the code that exists."""
+"""The glossary: each term with its meaning, a source that is spelt out and a place in the code that exists."""
 
 import re
 from pathlib import Path
@@ -10,25 +10,20 @@ TEXT = (ROOT / "docs" / "glossary.md").read_text(encoding="utf-8")
 TERMS, _, SOURCES = TEXT.partition("\n## Sources\n")
 
 
-def rows(text: str) -> list[list[str]]:
-    """Return the rows of the tables, without their heads."""
-    cells = [[cell.strip() for cell in line.strip("|").split("|")] for line in text.splitlines() if line[:1] == "|"]
-    return [row for row in cells if set(row[0]) != {"-"} and row[0] not in {"term", "short"}]
-
-
-ENTRIES = rows(TERMS)
-SPELT_OUT = {row[0] for row in rows(SOURCES)} | {"ours"}
+TERM = re.compile(r"^- \*\*(.+?)\*\*(?:, [^:]+)?: (.+?\.) \((.+); ((?:`[^`]+` ?)+)\)$", re.MULTILINE)
+ENTRIES = TERM.findall(TERMS)
+SPELT_OUT = {*re.findall(r"^- \*\*(.+?)\*\*: ", SOURCES, re.MULTILINE), "ours"}
 
 
 def test_there_are_some_sixty_terms_and_none_twice() -> None:
     terms = [row[0] for row in ENTRIES]
-    assert len(terms) >= 60
+    assert len(terms) == TERMS.count("\n- ") >= 60
     assert len(set(terms)) == len(terms)
 
 
 @pytest.mark.parametrize("row", ENTRIES, ids=lambda row: row[0])
-def test_a_term_is_one_sentence_with_a_source_and_a_place(row: list[str]) -> None:
-    _, meaning, _, source, place = row
+def test_a_term_has_a_meaning_a_source_and_a_place(row: tuple[str, str, str, str]) -> None:
+    _, meaning, source, place = row
     assert meaning.endswith(".")
     assert "`" not in meaning or "register `why`" in meaning
     assert set(re.sub(r" \(.*?\)", "", source).split(", ")) <= SPELT_OUT

@@ -16,7 +16,7 @@ if TYPE_CHECKING:
 
 AGEING = 1.3
 """Factor on F_c and F_s."""
-AGES_AT_S = 8.0
+AGES_AT_S = 10.0
 PERIOD_S = 1e-3
 WINDOW_S = 0.8
 """Length of the identification."""
@@ -24,6 +24,8 @@ RTU_PERIOD_S = 5e-3
 """On a pseudo-terminal, an exchange takes two silences of 1.75 ms; at 115200 baud a real line adds 4.2 ms."""
 RTU_WINDOW_S = 1.2
 """A fifth of the samples in a second: a longer window, within the rise of the sine, brings k/c back within 1 %."""
+LOCKSTEP_REPLY_TIMEOUT_S = 1.0
+"""Nobody waits for the clock there, so that a reply may take as long as a busy machine needs."""
 STROKE_M = 0.1016
 """Of the seed's valve."""
 RECORDER = '[recorder]\nfolder = "recordings"\n'
@@ -46,6 +48,8 @@ class BusSetup:
     """Of the daemon's cycle."""
     window_s: float = WINDOW_S
     """Of its identification."""
+    reply_timeout_s: float | None = None
+    """Within which the device answers; None: the daemon's own."""
 
 
 @contextmanager
@@ -108,9 +112,9 @@ def daemon_running(
         tables: more of its file.
         lockstep: whether the slave goes in lockstep with it.
     """
-    cycle = f"[cycle]\nperiod_s = {setup.period_s}"
-    if lockstep:  # nobody waits for the clock, so a reply may take as long as a busy machine needs
-        cycle = 'reply_timeout_s = 1.0\n[cycle]\npace = "device"'
+    timeout_s = LOCKSTEP_REPLY_TIMEOUT_S if lockstep else setup.reply_timeout_s
+    reply = "" if timeout_s is None else f"reply_timeout_s = {timeout_s}\n"
+    cycle = reply + ('[cycle]\npace = "device"' if lockstep else f"[cycle]\nperiod_s = {setup.period_s}")
     with running("run", _write(path, _daemon_toml(setup, slave, cycle, tables))) as daemon:
         yield daemon
 
