@@ -3,6 +3,7 @@
 import json
 import shlex
 from collections import Counter
+from dataclasses import replace
 from pathlib import Path
 
 import pytest
@@ -211,7 +212,7 @@ def test_on_the_other_buses_the_same_files_bring_up_a_valve_that_obeys(
     monkeypatch.setattr(simulated_plant, "running", running)
     with (
         slave_running(bus, tmp_path, "seed") as (setup, slave),
-        daemon_running(tmp_path / "daemon.toml", setup, slave) as daemon,
+        daemon_running(tmp_path / "daemon.toml", replace(setup, reply_timeout_s=1.0, period_s=0.02), slave) as daemon,
     ):
         assert slave.startswith(where)
         with Dcs("127.0.0.1", port_in(daemon)) as dcs:
