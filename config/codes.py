@@ -134,6 +134,10 @@ class InhibitReason(Code):
     )
     CUT_OFF = 27, "the reference is beyond a cut-off, so the stem is pressed onto its stop"
     PRESSURE_ELSEWHERE = 28, "a slide waits, for the measured pressure is not the one commanded: the supply may be low"
+    ONE_DIRECTION = (
+        29,
+        "one direction identified: the first move the other way goes by steps, until the stem has landed",
+    )
 
 
 class Restored(Code):
@@ -269,6 +273,7 @@ class Ne107Cause(Code):
     COMMAND_RATE = 18, "command changes too fast"
     NOT_AT_REST = 19, "the stem does not come to rest"
     PRESSURE_ELSEWHERE = 20, "the measured pressure is not the one commanded"
+    ONE_DIRECTION = 21, "one direction identified: how far a move goes the other way is not known"
 
 
 class EventKind(Code):

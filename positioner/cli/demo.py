@@ -73,8 +73,8 @@ folder = "slides"
 """
 """Beside its law, which is the default: slides wait for a late reply, so a busy machine need be no fault."""
 STAIRCASE_WITHIN_S = 60.0
-SETTLED_S = 0.2
-"""The error of a step is the mean over this last part of it."""
+BEGUN_S, SETTLED_S = 0.1, 0.2
+"""Of a step: until it is seen what the law does; the last part, over which the mean is its error."""
 IDENTIFICATIONS = 3
 """At most in a phase: a machine that is held up for a moment loses samples, and what they leave is refused."""
 ACKNOWLEDGEMENTS = 10
@@ -347,11 +347,16 @@ def _steps(
     step_s: float = STEP_S,
 ) -> list[StepOutcome]:
     """Make the steps; what is over after the packing has aged does not count for the packing that was identified."""
+    from config.codes import InhibitReason
+
     steps = []
     for reference_pu in references_pu:
         dcs.set("reference", reference_pu)
         label = f"{phase}: step to {reference_pu:g} p.u."
-        _observe(dcs, step_s - SETTLED_S, label)
+        _observe(dcs, BEGUN_S, label)
+        while int(dcs.get("why")) == InhibitReason.ONE_DIRECTION:  # the sine has seen the stem move upward alone
+            _observe(dcs, BEGUN_S, label)
+        _observe(dcs, step_s - SETTLED_S - BEGUN_S, label)
         settled_pu = _observe(dcs, SETTLED_S, label)
         limit_now_pu = limit_pu if time.monotonic() < until_s else None
         steps.append(StepOutcome(phase, reference_pu, settled_pu - reference_pu, limit_now_pu))

@@ -13,6 +13,7 @@ real time.
     pressure_clamp                              the one clamp: what is not finite is not commanded
     pressure_path                               lead against a slow pressure of an extended valve, and its arrival
     travel                                      from the DCS's signal to the reference: characteristic, ramp, cut-offs
+    first_landing                               by steps in a direction whose friction is not known
     valve_knowledge, restoration                what is known of a valve, as data; is it still true after a restart
     excitation                                  S3: which excitation is under way, and when it ends
     sine_excitation, staircase_excitation       a sine, or a staircase of slides

@@ -24,7 +24,7 @@ from config.codes import (
     State,
 )
 from config.quantities import DeviceStatus
-from positioner.control import pressure_path
+from positioner.control import first_landing, pressure_path
 from positioner.control.controller_memory import ConsumedRequests, ControllerMemory, Decision
 from positioner.control.excitation import NOTHING, ActiveExcitation, climbed, excitation_after
 from positioner.control.identifying import estimates_tested, identify
@@ -97,6 +97,7 @@ class Controller:
             restoration=Restoration.of(restored, settings.valve),
             cut_off=WITHIN,
             course=OnCourse.begun(0.0, 0.0),
+            first_landing=0,
         )
 
     @property
@@ -181,12 +182,15 @@ def step(now: Now) -> tuple[ControllerMemory, Decision]:
     cut_off = settings.cutoffs.after(memory.cut_off, reference.value_m) if state in FOLLOWING else WITHIN
     follows = state in FOLLOWING and cut_off == WITHIN
     dead_band_m = _dead_band_m(now, applied)
-    law = _law(now, reference, applied.ratios if follows else None, outcome, dead_band_m)
+    seen = _seen(now, reference, applied.ratios if follows else None, outcome, dead_band_m)
+    by_steps, law = _law(now, seen)
 
     asked_pa = _asked_pa(now, consumed, supervision, held_pa)
     if asked_pa is None:
         exciting = experiment if experiment.commands else excitation
         asked_pa = _pressure_pa(now, state, held_pa, exciting, law, cut_off)
+        if by_steps and applied.ratios is not None:
+            asked_pa = _stepped_pa(now, by_steps, applied.ratios, reference)
     commanded = _commanded(now, asked_pa, lead=not supervision.fault and follows)
     if commanded is None:
         supervision, state, held_pa = supervision.failed(settings.limits), S0, memory.wanted_pa
@@ -195,7 +199,8 @@ def step(now: Now) -> tuple[ControllerMemory, Decision]:
         commanded = _held_instead(now)
     wanted_pa, command_pa, path = commanded
 
-    by_law = InhibitReason.CUT_OFF if cut_off != WITHIN else law.inhibit_reason
+    by_law = InhibitReason.ONE_DIRECTION if by_steps else law.inhibit_reason
+    by_law = InhibitReason.CUT_OFF if cut_off != WITHIN else by_law
     inhibit_reason = (
         excitation_inhibit
         or (NOTHING if experiment.commands or excitation is None else excitation.waits_for(now.statics))
@@ -220,6 +225,7 @@ def step(now: Now) -> tuple[ControllerMemory, Decision]:
         measured=supervision.position_m is not None,
         cut_off=cut_off,
         dead_band_m=dead_band_m,
+        one_direction=_knows_one_direction(now, applied.ratios),
     )
     return ControllerMemory(
         command_pa=command_pa,
@@ -239,6 +245,7 @@ def step(now: Now) -> tuple[ControllerMemory, Decision]:
         restoration=restoration,
         cut_off=cut_off,
         course=course,
+        first_landing=by_steps,
     ), decision
 
 
@@ -339,11 +346,39 @@ def _dead_band_m(now: Now, applied: Applied) -> float:
     return settings.in_force_m(now.statics.detector.noise_m, now.identification.estimates.breakaway, applied.ratios)
 
 
-def _law(
+def _law(now: Now, seen: Seen) -> tuple[int, Law]:
+    """Return the law after this sample, and in which direction the stem goes by steps in its place, 0: it does not."""
+    memory, ratios = now.memory, seen.ratios
+    if ratios is None or not _knows_one_direction(now, ratios):
+        return 0, memory.law.observe(seen)
+    unseen, at_m = ratios.directions.unseen, now.sample.position_m
+    asked_anew = seen.reference_m != memory.reference.value_m
+    if not first_landing.goes_on(memory.first_landing, ratios, seen.reference_m - at_m, asked_anew=asked_anew):
+        law, stroke_m = memory.law.observe(seen), now.settings.limits.stroke_m
+        if not first_landing.needed(unseen, ratios, law.command_pa, memory.wanted_pa, at_m, stroke_m):
+            return 0, law
+    return unseen, memory.law.observe(seen._replace(ratios=None))
+
+
+def _knows_one_direction(now: Now, ratios: Ratios | None) -> bool:
+    """Whether a law that commands by what friction is would do so in a direction in which it is not known."""
+    by_friction = now.settings.law.by_single_steps and now.settings.valve is None
+    return by_friction and ratios is not None and ratios.directions.unseen != 0
+
+
+def _stepped_pa(now: Now, direction: int, ratios: Ratios, reference: Reference) -> float:
+    """Return the pressure of a stem on its way to its first landing in a direction, Pa: the next step once it rests."""
+    rest, wanted_pa, stroke_m = now.statics.detector.rest, now.memory.wanted_pa, now.settings.limits.stroke_m
+    if rest is None or now.stem_m is None:
+        return wanted_pa
+    return first_landing.stepped_pa(wanted_pa, direction, ratios, reference.value_m - rest.position_m, stroke_m)
+
+
+def _seen(
     now: Now, reference: Reference, ratios: Ratios | None, outcome: SlideOutcome | None, dead_band_m: float
-) -> Law:
-    """Return the law after this sample; its ratios are None where it does not command."""
-    seen = Seen(
+) -> Seen:
+    """Return what the law is shown; its ratios are None where it does not command."""
+    return Seen(
         sample=now.sample,
         usable=now.stem_m is not None,
         command_pa=now.memory.wanted_pa,
@@ -355,7 +390,6 @@ def _law(
         statics=now.statics,
         valve=now.settings.valve,
     )
-    return now.memory.law.observe(seen)
 
 
 def _asked_pa(now: Now, consumed: ConsumedRequests, supervision: SupervisionMemory, held_pa: float) -> float | None:

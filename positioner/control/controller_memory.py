@@ -53,6 +53,8 @@ class ControllerMemory(NamedTuple):
     """The stop onto which the stem is pressed, see `travel.cutoffs`."""
     course: OnCourse
     """Of the reference in force to the one asked for."""
+    first_landing: int
+    """The direction in which the stem goes by steps to its first landing, 0: it does not; see `first_landing`."""
 
 
 class Decision(NamedTuple):
@@ -79,3 +81,5 @@ class Decision(NamedTuple):
     """The stop onto which the stem is pressed."""
     dead_band_m: float = 0.0
     """Error at rest that is left alone."""
+    one_direction: bool = False
+    """Whether the law needs friction of a direction in which it is not known."""

@@ -46,7 +46,7 @@ def identify(
         return False, _concluded(memory.applied, staircase, statics, broken_off=broken_off)
     if not wanted:
         found = memory.identifying and not by_slides
-        return False, accept(memory.applied, statics.tested(identification.estimates)) if found else memory.applied
+        return False, _accepted(memory.applied, identification, statics) if found else memory.applied
     if not memory.identifying or (excitation is not None and memory.excitation is None):
         identification.restart()
     moves_before = identification.moves
@@ -61,7 +61,12 @@ def identify(
         )
     # No excitation ends, so the estimates of ordinary moves are applied move by move.
     move_identified = identification.moves != moves_before
-    return True, accept(memory.applied, statics.tested(identification.estimates)) if move_identified else memory.applied
+    return True, _accepted(memory.applied, identification, statics) if move_identified else memory.applied
+
+
+def _accepted(applied: Applied, identification: Identification, statics: StaticIdentification) -> Applied:
+    """Return what is applied after motions: of a direction in which the stem did not move, what its landings say."""
+    return statics.completed(accept(applied, statics.tested(identification.estimates)))
 
 
 def _concluded(applied: Applied, staircase: Staircase, statics: StaticIdentification, *, broken_off: bool) -> Applied:

@@ -7,7 +7,8 @@
 
     rests       c - t f_s - tau <= p <= c + t f_s + tau        t threshold, times what it needs
 
-Where nothing has been identified, or only one direction, there is none: what the valve needs is not known then.
+In a direction in which friction has not been seen it may be three times as much: so much it is with a preload of half
+the friction. Where nothing has been identified there is no band: what the valve needs is not known then.
 """
 
 from dataclasses import dataclass
@@ -20,6 +21,8 @@ from positioner.estimation.landings.static_identification import StaticIdentific
 
 STATIC = 0.5
 """Of Coulomb friction: static friction is taken for no more beyond it, where no shorter slide has been seen."""
+UNSEEN = 3.0
+"""Times the friction of the direction that was seen: the most that is expected in the other."""
 NEAR, RESIDUALS = 0.02, 3.0
 """Of the stroke; of the deviation of landings: by which the balance may be off at a place."""
 
@@ -47,8 +50,10 @@ class RestBand:
         balance = self.ratios.balance_pa if self.valve is None else self.valve.landing_pa
         up_pa, down_pa = balance(position_m, 1), balance(position_m, -1)
         middle_pa, friction_pa = 0.5 * (up_pa + down_pa), max(0.0, 0.5 * (up_pa - down_pa))
-        half_pa = threshold * (friction_pa + min(self.beyond_pa, STATIC * friction_pa)) + self.off_pa
-        return middle_pa - half_pa, middle_pa + half_pa
+        static_pa = threshold * (friction_pa + min(self.beyond_pa, STATIC * friction_pa))
+        unseen = self.ratios.directions.unseen
+        low_pa, high_pa = (static_pa * (UNSEEN if unseen == each else 1.0) for each in (-1, 1))
+        return middle_pa - low_pa - self.off_pa, middle_pa + high_pa + self.off_pa
 
 
 def rest_band(

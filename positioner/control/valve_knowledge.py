@@ -9,7 +9,7 @@ from math import inf, isfinite, sqrt
 
 from config.extended_valve import ExtendedValve
 from positioner.estimation.acceptance import Ratios
-from positioner.estimation.estimates import Estimate, Estimates
+from positioner.estimation.estimates import Directions, Estimate, Estimates
 from positioner.estimation.landings.breakaway_distance import BreakawayDistance
 from positioner.estimation.landings.extended_balance import extended_scatter_m
 from positioner.estimation.landings.landing_detector import Answers, SlideOutcome
@@ -22,8 +22,8 @@ LARGEST_STD = 0.05
 """Of κ and φ: the deviation of what was applied, where nobody knows it any more."""
 UNANSWERED = Answers()
 NO_DOUBT: Covariance = ((0.0, 0.0, 0.0),) * 3
-OTHER_WAY = 0.2
-"""Of φ: what a sine, which moves the stem one way, leaves open of the other."""
+OTHER_WAY, UNSEEN = 0.2, 1.0
+"""Of φ: what a sine, which moves the stem one way, leaves open of the other, after a landing there and before."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -113,10 +113,11 @@ def _before(outcomes: tuple[SlideOutcome, ...], now_s: float) -> tuple[SlideOutc
 
 def _covariance(ratios: Ratios, estimates: Estimates) -> Covariance:
     """Return the covariance of (κ, φ_up, φ_down) where they come from a motion one way, and no landing tells more."""
-    slope = _std(estimates.b_over_c, ratios.b_over_c)
+    slope, seen = _std(estimates.b_over_c, ratios.b_over_c), estimates.directions
     friction = _std(estimates.k_over_c, ratios.k_over_c)
-    other = OTHER_WAY * ratios.k_over_c
-    return (slope**2, 0.0, 0.0), (0.0, friction**2, 0.0), (0.0, 0.0, other**2)
+    other = (UNSEEN if ratios.directions.unseen else OTHER_WAY) * ratios.k_over_c
+    up, down = (other, friction) if seen is Directions.DOWN else (friction, other)
+    return (slope**2, 0.0, 0.0), (0.0, up**2, 0.0), (0.0, 0.0, down**2)
 
 
 def _std(estimate: Estimate, value: float) -> float:

@@ -4,15 +4,29 @@
 
 The two numbers of the law are taken together: each that was asked for must be valid and not too far from the one in
 use, or both stay as they are.
+
+Friction has two numbers, φ_up and φ_down, with preload and unlike packings (`landings.static_law`):
+
+    k/c = -(φ_up + φ_down)/2,    offset = (φ_up - φ_down)/2
+
+A motion one way, s, says φ_s alone. Of a valve of which the other was known before,
+
+    φ'_-s = φ_-s + (φ'_s - φ_s)     a preload stays, friction grows alike; or
+    φ'_-s = φ_-s φ'_s/φ_s           all of it grows
+
+and where the two differ by more than 5 % of φ'_s, φ_-s is not known any more. Where nothing was known, φ_-s = φ_s is
+a guess. What is not known is a direction (`Ratios.directions`), in which the first landing (`first_landing`) tells it.
 """
 
 from dataclasses import dataclass, replace
 
 from config.codes import Refusal
-from positioner.estimation.estimates import Estimate, Estimates
+from positioner.estimation.estimates import Directions, Estimate, Estimates
 
 LARGEST_CHANGE = 4.0
 """Factor by which b/c and k/c may differ from those in use, up or down."""
+OPEN = 0.05
+"""Of friction: by which that of the other direction may be open."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -23,6 +37,17 @@ class Ratios:
     k_over_c: float
     offset_pa: float = 0.0
     """What preload and unlike friction up and down add to the balance of either direction; 0 in the seed's model."""
+    directions: Directions = Directions.BOTH
+    """In which friction is known; of another it is a guess."""
+
+    @classmethod
+    def of(cls, slope: float, up_pa: float, down_pa: float, directions: Directions = Directions.BOTH) -> "Ratios":
+        """Return the ratios of κ, Pa/m, and of φ_up and φ_down, Pa."""
+        return cls(-slope, -(up_pa + down_pa) / 2, (up_pa - down_pa) / 2, directions)
+
+    def friction_pa(self, direction: int) -> float:
+        """Return φ of a direction, Pa: what moving that way takes beside the spring."""
+        return -self.k_over_c + direction * self.offset_pa
 
     def balance_pa(self, position_m: float, direction: int) -> float:
         """Return the pressure, Pa, that balances a stem moving up (+1) or down (-1) at a position, m: (23), (24)."""
@@ -78,7 +103,30 @@ def _changes_implausibly(new: Estimate, in_use: float) -> bool:
 
 
 def _ratios(in_use: Ratios | None, estimated: Estimates) -> Ratios:
-    slope, friction = estimated.b_over_c, estimated.k_over_c
-    if in_use is None or estimated.law_ready:
-        return Ratios(slope.value, friction.value)
-    return Ratios(slope.value, in_use.k_over_c) if slope.valid else Ratios(in_use.b_over_c, friction.value)
+    slope, friction, seen = estimated.b_over_c, estimated.k_over_c, estimated.directions
+    if in_use is None:
+        return Ratios(slope.value, friction.value, directions=seen)
+    b_over_c = slope.value if slope.valid else in_use.b_over_c
+    if not friction.valid:
+        return replace(in_use, b_over_c=b_over_c)
+    if seen is Directions.BOTH:
+        return Ratios(b_over_c, friction.value)
+    return _grown(replace(in_use, b_over_c=b_over_c), -friction.value, seen)
+
+
+def _grown(in_use: Ratios, friction_pa: float, seen: Directions) -> Ratios:
+    """Return ratios with the friction of one direction, Pa, and what that says of the other."""
+    s, slope = seen.value, -in_use.b_over_c
+    before_pa, other_pa = in_use.friction_pa(s), in_use.friction_pa(-s)
+    directions = Directions.BOTH
+    if in_use.directions.unseen == -s:
+        directions, other_pa = seen, friction_pa
+    elif in_use.directions is Directions.BOTH:
+        grown_pa = friction_pa - before_pa
+        if abs(grown_pa * (before_pa - other_pa)) > OPEN * friction_pa * abs(before_pa):
+            directions = seen
+        other_pa += grown_pa
+    if friction_pa + other_pa <= 0.0:  # no valve's: the preload is another
+        directions, other_pa = seen, friction_pa
+    up_pa, down_pa = (friction_pa, other_pa) if s > 0 else (other_pa, friction_pa)
+    return Ratios.of(slope, up_pa, down_pa, directions)

@@ -29,6 +29,7 @@ their intervals share (`breakaway_force`).
 from dataclasses import dataclass, replace
 from functools import reduce
 from math import inf, nan, sqrt
+from operator import or_
 
 import numpy as np
 
@@ -37,7 +38,7 @@ from config.noise import position_noise_m
 from config.results.result import Brief
 from positioner.estimation.array import Array
 from positioner.estimation.breakaway_force import from_interval, intersection, with_validity
-from positioner.estimation.estimates import Estimate, Estimates, no_estimate, no_estimates
+from positioner.estimation.estimates import Directions, Estimate, Estimates, no_estimate, no_estimates
 from positioner.estimation.likelihood import LikelihoodFit, fit_motions
 from positioner.estimation.linear_problem import Prior
 from positioner.estimation.motion_preparation import CLEAR
@@ -319,7 +320,8 @@ def _estimates(best: _Hypothesis, noise_std_m: float | None, settings: BatchSett
             reason = Refusal(unphysical[number])
         found.append(Estimate(values[number], std[number], reason))
     a, b, c, k, b_over_c, k_over_c = found
-    return Estimates(a, b, c, k, b_over_c, k_over_c, progress=1.0, time_s=time_s)
+    directions = reduce(or_, (Directions(each.direction) for each in best.chosen))
+    return Estimates(a, b, c, k, b_over_c, k_over_c, progress=1.0, time_s=time_s, directions=directions)
 
 
 def _widened(fit: LikelihoodFit, settings: BatchSettings) -> LikelihoodFit:

@@ -1,10 +1,28 @@
 """What the identification hands on: each value with its standard deviation, and the reason if it is not valid."""
 
 from dataclasses import dataclass, replace
+from enum import Enum
 from math import nan
 
 from config.codes import Refusal
 from config.results.result import Brief
+
+
+class Directions(Enum):
+    """Directions in which the stem was seen to slide: of any other, friction is not known."""
+
+    UP = 1
+    DOWN = -1
+    BOTH = 0
+
+    @property
+    def unseen(self) -> int:
+        """The direction in which it was not, +1 up, -1 down; 0: there is none."""
+        return -self.value
+
+    def __or__(self, other: "Directions") -> "Directions":
+        """Return those of both."""
+        return self if self is other else Directions.BOTH
 
 
 @dataclass(frozen=True, slots=True)
@@ -44,6 +62,7 @@ class Estimates(Brief):
         progress: of the window that is being filled, 0 to 1.
         time_s: of the last sample used, by the device's clock; NaN when none was.
         breakaway: F_s / A, in Pa; from where the stem broke away, which only a whole record shows.
+        directions: in which the stem moved: of the other, k and k/c say nothing.
     """
 
     a: Estimate
@@ -55,6 +74,7 @@ class Estimates(Brief):
     progress: float
     time_s: float
     breakaway: Estimate = NO_BREAKAWAY
+    directions: Directions = Directions.BOTH
 
     @property
     def law_ready(self) -> bool:

@@ -21,7 +21,7 @@ from positioner.estimation.algebraic import Identifier
 from positioner.estimation.batch import BatchResult, BatchSettings
 from positioner.estimation.breakaway_force import after_event, with_validity
 from positioner.estimation.derivatives import Derivatives
-from positioner.estimation.estimates import NO_BREAKAWAY, Estimate, Estimates, no_estimate, no_estimates
+from positioner.estimation.estimates import NO_BREAKAWAY, Directions, Estimate, Estimates, no_estimate, no_estimates
 from positioner.estimation.friction_estimator import RunningMeans
 from positioner.estimation.motion_detector import MotionDetector, motion_start
 from positioner.estimation.passive import MovesPosterior, posterior_after
@@ -222,12 +222,15 @@ class Identification:
         self._awaited_since_s = None
         fits = result.fit is not None and result.estimates.b_over_c.reason is not Refusal.MODEL_DOES_NOT_FIT
         if result.fit is not None and fits:
-            self._posterior = posterior_after(self._posterior if self._passive else None, result.fit, time_s)
+            before = self._posterior if self._passive else None
+            self._posterior = posterior_after(before, result.fit, time_s, result.estimates.directions)
         parameters, friction = self._requested
         refined = result.estimates.only(parameters=parameters, friction=friction)
+        if self._passive and self._posterior is not None:
+            refined = replace(refined, directions=self._posterior.directions)
         if refined.acceptable:
-            before = self._broke_away if self._passive else NO_BREAKAWAY
-            broke_away = after_event(before, refined.breakaway, time_s - self._broke_away_s)
+            broke_before = self._broke_away if self._passive else NO_BREAKAWAY
+            broke_away = after_event(broke_before, refined.breakaway, time_s - self._broke_away_s)
             self._broke_away, self._broke_away_s = broke_away, time_s
             self.estimates = replace(refined, breakaway=with_validity(broke_away, self._settings.largest_relative_std))
             self.moves += self._passive
@@ -324,7 +327,8 @@ class Identification:
             return replace(no_estimates(Refusal.WINDOW_TOO_SHORT), progress=progress)
         a, b, c, b_over_c = self._read_parameters()
         k, k_over_c = self._read_friction()
-        return Estimates(a, b, c, k, b_over_c, k_over_c, progress=progress, time_s=time_s)
+        directions = Directions(self._motion.direction)
+        return Estimates(a, b, c, k, b_over_c, k_over_c, progress=progress, time_s=time_s, directions=directions)
 
     def _read_parameters(self) -> tuple[Estimate, Estimate, Estimate, Estimate]:
         if not self._requested[0]:

@@ -17,6 +17,7 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
+from positioner.estimation.estimates import Directions
 from positioner.estimation.likelihood import LikelihoodFit
 from positioner.estimation.linear_problem import Prior
 
@@ -30,10 +31,11 @@ FORGETTING = 0.1
 
 @dataclass(frozen=True, slots=True)
 class MovesPosterior:
-    """What is known after the moves up to now, and when the last of them ended."""
+    """What is known after the moves up to now, when the last of them ended, and which way they went."""
 
     fit: LikelihoodFit
     time_s: float
+    directions: Directions
 
     def prior(self, time_s: float) -> Prior:
         """Return what is known at a later time: (H^-1 + Q)^-1 = H - H (H + Q^-1)^-1 H, for H may be singular."""
@@ -47,13 +49,15 @@ class MovesPosterior:
         return Prior(self.fit.p, (np.sqrt(np.maximum(powers, 0.0))[:, None] * axes.T) / size)
 
 
-def posterior_after(posterior: MovesPosterior | None, fit: LikelihoodFit, time_s: float) -> MovesPosterior | None:
+def posterior_after(
+    posterior: MovesPosterior | None, fit: LikelihoodFit, time_s: float, directions: Directions
+) -> MovesPosterior | None:
     """Return what is known after a move, or what was known when the move does not inform."""
     if not (np.isfinite(fit.p).all() and np.isfinite(fit.root).all()):
         return posterior
     if posterior is None:
-        return MovesPosterior(fit, time_s)
+        return MovesPosterior(fit, time_s, directions)
     if fit.residual_std_m > OUTLIER * posterior.fit.residual_std_m:
         return posterior
     noise_m = (1 - FORGETTING) * posterior.fit.residual_std_m + FORGETTING * fit.residual_std_m
-    return MovesPosterior(replace(fit, residual_std_m=noise_m), time_s)
+    return MovesPosterior(replace(fit, residual_std_m=noise_m), time_s, posterior.directions | directions)

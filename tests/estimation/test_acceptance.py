@@ -7,7 +7,7 @@ import pytest
 
 from config.codes import Refusal
 from positioner.estimation.acceptance import Applied, Ratios, accept
-from positioner.estimation.estimates import Estimate, Estimates, no_estimates
+from positioner.estimation.estimates import Directions, Estimate, Estimates, no_estimates
 
 IN_USE = Applied(Ratios(-8e5, -2e4), count=3, refusals=1, last_refusal=Refusal.VALID)
 VALID, UNCERTAIN, NOT_ASKED = Refusal.VALID, Refusal.TOO_UNCERTAIN, Refusal.NOT_ASKED
@@ -54,6 +54,31 @@ def test_a_bad_identification_never_replaces_a_good_one(
     assert after.last_refusal is refused
     accepted = refused is VALID
     assert (after.count - before.count, after.refusals - before.refusals) == (accepted, not accepted)
+
+
+ONE_WAY = [
+    # in use: φ up, φ down, known -> found: φ, direction; then φ up, φ down, known
+    ((20e3, 20e3, "BOTH"), (30e3, "UP"), (30e3, 30e3, "BOTH")),  # nothing but friction: it has grown alike
+    ((30e3, 10e3, "BOTH"), (30.5e3, "UP"), (30.5e3, 10.5e3, "BOTH")),  # a preload, and nothing has changed
+    ((30e3, 10e3, "BOTH"), (36e3, "UP"), (36e3, 16e3, "UP")),  # friction, or all of it: 16 or 12 kPa
+    ((30e3, 10e3, "BOTH"), (13e3, "DOWN"), (33e3, 13e3, "DOWN")),
+    ((30e3, 30e3, "UP"), (10e3, "DOWN"), (30e3, 10e3, "BOTH")),  # what was a guess says nothing
+    ((30e3, 30e3, "UP"), (30e3, "UP"), (30e3, 30e3, "UP")),
+]
+
+
+@pytest.mark.parametrize(("before", "found", "after"), ONE_WAY)
+def test_a_motion_one_way_says_friction_of_that_direction(
+    before: tuple[float, float, str], found: tuple[float, str], after: tuple[float, float, str]
+) -> None:
+    in_use = Applied(Ratios.of(8e5, *before[:2], Directions[before[2]]))
+    estimates = replace(estimated(NONE, value(-found[0])), directions=Directions[found[1]])
+    ratios = accept(in_use, estimates).ratios
+    assert ratios is not None
+    assert (ratios.friction_pa(1), ratios.friction_pa(-1)) == pytest.approx(after[:2])
+    assert ratios.directions is Directions[after[2]]
+    s = ratios.directions.value or 1
+    assert ratios.balance_pa(0.05, s) == pytest.approx(8e5 * 0.05 + s * ratios.friction_pa(s))
 
 
 @pytest.mark.parametrize("reason", [each for each in Refusal if each is not VALID])

@@ -26,6 +26,7 @@ CLASS = {
     Ne107Cause.STUCK: Ne107Status.OUT_OF_SPECIFICATION,
     Ne107Cause.NOT_AT_REST: Ne107Status.OUT_OF_SPECIFICATION,
     Ne107Cause.PRESSURE_ELSEWHERE: Ne107Status.OUT_OF_SPECIFICATION,
+    Ne107Cause.ONE_DIRECTION: Ne107Status.OUT_OF_SPECIFICATION,
     Ne107Cause.FRICTION_HIGH: Ne107Status.MAINTENANCE_REQUIRED,
     Ne107Cause.FRICTION_LOW: Ne107Status.MAINTENANCE_REQUIRED,
     Ne107Cause.STICTION: Ne107Status.MAINTENANCE_REQUIRED,
@@ -91,6 +92,7 @@ def ne107_condition(decision: Decision, health: Health) -> Ne107Condition:
         Ne107Cause.STUCK: decision.inhibit_reason is InhibitReason.STUCK,
         Ne107Cause.NOT_AT_REST: decision.inhibit_reason is InhibitReason.NOT_AT_REST,
         Ne107Cause.PRESSURE_ELSEWHERE: decision.inhibit_reason is InhibitReason.PRESSURE_ELSEWHERE,
+        Ne107Cause.ONE_DIRECTION: decision.one_direction,
     }
     of_faults = health.settings.fault_classes
     classes = {

@@ -1,7 +1,8 @@
 """A valve's health as it runs: travel, reversals, stiction index, and the friction with its baseline.
 
     friction        -k/c = F_c / A of the estimates that the law uses, Pa
-    baseline        the friction of the first identification that is applied, or of the engineer's command
+    baseline        the friction of the first identification that is applied and knows both directions, or of the
+                    engineer's command: of one direction alone friction and a preload are one number
     friction ratio  friction / baseline: high where the packing is too tight, low where it leaks
 
 `enter` is called once a cycle by the cycle thread: a few comparisons, nothing is made anew. Others read what it leaves.
@@ -154,7 +155,7 @@ class Health:
         if applied.ratios is None:
             return
         self._friction_pa = -applied.ratios.k_over_c
-        if applied.count and not isfinite(self._baseline_pa):
+        if applied.count and not applied.ratios.directions.unseen and not isfinite(self._baseline_pa):
             self._baseline_pa = self._friction_pa
 
     def _obey(self, requests: Requests) -> None:

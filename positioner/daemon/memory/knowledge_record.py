@@ -1,12 +1,13 @@
 """What is known of a valve as JSON, and back. Nothing is taken that could not be true."""
 
 import math
-from typing import Annotated, Any
+from typing import Annotated, Any, Literal
 
 from pydantic import BaseModel, ConfigDict, Field, ValidationError
 
 from positioner.control.valve_knowledge import ValveKnowledge
 from positioner.estimation.acceptance import Ratios
+from positioner.estimation.estimates import Directions
 from positioner.estimation.landings.breakaway_distance import BreakawayDistance, Interval
 from positioner.estimation.landings.landing_detector import Answers, SlideOutcome
 
@@ -51,6 +52,8 @@ class KnowledgeRecord(_Record):
     b_over_c_pa_per_m: float = Field(ge=-1e12, le=-1.0)
     k_over_c_pa: float = Field(ge=-1e9, lt=-1e-6)
     offset_pa: Pressure
+    directions: Literal["UP", "DOWN", "BOTH"] = "BOTH"
+    """In which friction is known; what was kept before it was said counted as both."""
     covariance: list[list[Figure]] = Field(min_length=3, max_length=3)
     residual_m: Length
     landings: list[_Slide] = Field(max_length=MOST)
@@ -67,6 +70,7 @@ def record_of(knowledge: ValveKnowledge) -> dict[str, Any]:
         "b_over_c_pa_per_m": ratios.b_over_c,
         "k_over_c_pa": ratios.k_over_c,
         "offset_pa": ratios.offset_pa,
+        "directions": ratios.directions.name,
         "covariance": [list(row) for row in knowledge.covariance],
         "residual_m": knowledge.residual_m,
         "landings": [each._asdict() for each in knowledge.landings[:MOST] if _finite(each)],
@@ -91,7 +95,7 @@ def knowledge_in(content: object) -> ValveKnowledge:
         raise ValueError(f"{where}: {fault['msg']}") from None
     a, b, c = (_row(row) for row in record.covariance)
     return ValveKnowledge(
-        ratios=Ratios(record.b_over_c_pa_per_m, record.k_over_c_pa, record.offset_pa),
+        ratios=Ratios(record.b_over_c_pa_per_m, record.k_over_c_pa, record.offset_pa, Directions[record.directions]),
         covariance=(a, b, c),
         residual_m=record.residual_m,
         landings=_outcomes(record.landings),

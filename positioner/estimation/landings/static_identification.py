@@ -199,17 +199,33 @@ class StaticIdentification:
         slope, friction = estimates.b_over_c, estimates.k_over_c
         if not (self.law.valid and slope.valid and friction.valid):
             return estimates
-        if not self.law.contradicts(Ratios(slope.value, friction.value), self._stroke_m):
+        ratios = Ratios(slope.value, friction.value, directions=estimates.directions)
+        if not self.law.contradicts(ratios, self._stroke_m):
             return estimates
         refused = Refusal.CONTRADICTED_BY_LANDINGS
         k = replace(estimates.k, reason=refused) if estimates.k.valid else estimates.k
         return replace(estimates, k=k, k_over_c=replace(friction, reason=refused))
 
     def corrected(self, applied: Applied) -> Applied:
-        """Return what is applied after a landing: the law's own numbers in place of such as it contradicts."""
-        if applied.ratios is None or self.valve is not None or not self.law.contradicts(applied.ratios, self._stroke_m):
+        """Return what is applied after a landing: completed, or the numbers of the law where it contradicts them."""
+        if applied.ratios is None or self.valve is not None:
+            return applied
+        applied = self.completed(applied)
+        if applied.ratios is None or not self.law.contradicts(applied.ratios, self._stroke_m):
             return applied
         return Applied(self.law.ratios, applied.count + 1, applied.refusals, Refusal.CONTRADICTED_BY_LANDINGS)
+
+    def completed(self, applied: Applied) -> Applied:
+        """Return what is applied with friction in a direction that was not seen, by the last landing there."""
+        ratios = applied.ratios
+        if ratios is None or not (s := ratios.directions.unseen) or not self._in_direction[s]:
+            return applied
+        last, slope = self._in_direction[s][0], -ratios.b_over_c
+        unseen_pa, seen_pa = s * (last.command_pa - slope * last.position_m), ratios.friction_pa(-s)
+        if unseen_pa + seen_pa <= 0.0:  # no valve's: friction would drive it
+            return applied
+        up_pa, down_pa = (unseen_pa, seen_pa) if s > 0 else (seen_pa, unseen_pa)
+        return replace(applied, ratios=Ratios.of(slope, up_pa, down_pa))
 
     def accepted(self, applied: Applied) -> Applied:
         """Return what is applied after an identification by landings alone: the law's numbers, or those in use."""

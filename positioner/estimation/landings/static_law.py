@@ -99,7 +99,7 @@ class StaticLaw:
     def ratios(self) -> Ratios:
         """What the control laws need: b/c, k/c and the offset."""
         up, down = self.up.value, self.down.value
-        return Ratios(-self.slope.value, -(up + down) / 2, (up - down) / 2)
+        return Ratios.of(self.slope.value, up, down)
 
     @property
     def offset(self) -> Estimate:
@@ -111,12 +111,15 @@ class StaticLaw:
         return Estimate((self.up.value - self.down.value) / 2, std, self.reason)
 
     def contradicts(self, ratios: Ratios, stroke_m: float) -> bool:
-        """Whether ratios land elsewhere than the stem did: beyond three deviations, in the middle of either line."""
+        """Whether ratios land elsewhere than the stem did: beyond three deviations, in the middle of either line.
+
+        Of a direction in which they know no friction they say nothing.
+        """
         if not self.valid:
             return False
         theta = np.array((self.slope.value, self.up.value, self.down.value))
-        theirs = np.array((-ratios.b_over_c, ratios.offset_pa - ratios.k_over_c, -ratios.k_over_c - ratios.offset_pa))
-        for direction in (1, -1):
+        theirs = np.array((-ratios.b_over_c, ratios.friction_pa(1), ratios.friction_pa(-1)))
+        for direction in {1, -1} - {ratios.directions.unseen}:
             row = np.array((0.5 * stroke_m, float(direction > 0), -float(direction < 0)))
             shift_pa = abs(float(row @ (theta - theirs)))
             std_pa = sqrt(float(row @ self.covariance @ row))
@@ -172,7 +175,7 @@ def static_law(landings: Sequence[SlideOutcome], stroke_m: float) -> StaticLaw:
     covariance += np.diag((0.0, 1.0, 1.0)) * (slope * _short_m(slides)) ** 2
     std = np.sqrt(np.diag(covariance))
     reason = _refusal(slope, up_pa + down_pa, std, s, stroke_m)
-    bent_pa = _bent_by_pa(Ratios(-slope, -(up_pa + down_pa) / 2, (up_pa - down_pa) / 2), balances, stroke_m)
+    bent_pa = _bent_by_pa(Ratios.of(slope, up_pa, down_pa), balances, stroke_m)
     return StaticLaw(
         slope=Estimate(slope, float(std[0]), reason),
         up=Estimate(up_pa, float(std[1]), reason),

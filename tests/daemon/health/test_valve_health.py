@@ -70,13 +70,19 @@ class Panel:
             self.set(name, 1)
         self.run(0.1)
 
+    def land_below(self) -> None:
+        """Move up, down and up: a sine has seen the stem move upward alone."""
+        for reference in (0.85, 0.4, 0.6):
+            self.set("reference", reference)
+            self.run(1.0)
+
     @property
     def status(self) -> tuple[Ne107Status, Ne107Cause]:
         return Ne107Status(int(self.get("ne107"))), Ne107Cause(int(self.get("ne107_cause")))
 
 
 def test_from_start_through_identification_to_good() -> None:
-    """C while it does not follow the DCS, then good; the first applied identification is the baseline."""
+    """C while it does not follow the DCS, S while one direction is known, then good; then there is a baseline, too."""
     panel = Panel()
     assert panel.status == (Ne107Status.FUNCTION_CHECK, Ne107Cause.NOT_AUTOMATIC)
     panel.set("mode", Mode.AUTOMATIC)
@@ -88,10 +94,23 @@ def test_from_start_through_identification_to_good() -> None:
     assert panel.status == (Ne107Status.FUNCTION_CHECK, Ne107Cause.EXCITED)
     panel.identify()
     assert panel.get("identifications") == 1
+    assert panel.status == (Ne107Status.OUT_OF_SPECIFICATION, Ne107Cause.ONE_DIRECTION)
+    panel.land_below()
     assert panel.status == (Ne107Status.GOOD, Ne107Cause.NONE)
     seed = load_valve(shipped_valve("seed")).valve
     assert panel.get("friction_baseline") == pytest.approx(seed.coulomb_n / seed.diaphragm_area_m2, rel=0.05)
     assert panel.get("friction_ratio") == 1.0
+
+
+def test_a_move_that_ends_eight_percent_off_is_not_good() -> None:
+    """Friction typed too small by so much: the seed's law stops short, and has nothing to say of it."""
+    short_pa = 0.08 * STROKE_M * -LAW["b_over_c_pa_per_m"]
+    panel = Panel(LAW | {"k_over_c_pa": LAW["k_over_c_pa"] + short_pa})
+    panel.set("mode", Mode.AUTOMATIC)
+    panel.set("reference", 0.8)
+    panel.run(3.0)
+    assert panel.get("position") == pytest.approx(0.72, abs=0.01)
+    assert panel.status == (Ne107Status.OUT_OF_SPECIFICATION, Ne107Cause.TRAVEL_DEVIATION)
 
 
 @pytest.mark.long
@@ -144,12 +163,12 @@ def test_a_packing_that_ages_is_found_by_the_next_identification(
     factor: float, alpha_pa: float, cause: Ne107Cause
 ) -> None:
     seed = load_valve(shipped_valve("seed")).valve
-    aged = {"at_s": 2.0, "coulomb_n": factor * seed.coulomb_n, "static_n": factor * seed.static_n}
+    aged = {"at_s": 3.6, "coulomb_n": factor * seed.coulomb_n, "static_n": factor * seed.static_n}
     panel = Panel(change=(aged,))
     panel.set("mode", Mode.AUTOMATIC)
     panel.identify()
+    panel.land_below()
     assert panel.status == (Ne107Status.GOOD, Ne107Cause.NONE)
-    panel.run(1.0)
     panel.set("alpha", alpha_pa)
     panel.identify()
     assert panel.get("identifications") == 2

@@ -15,6 +15,7 @@ from positioner.control.valve_knowledge import ValveKnowledge
 from positioner.daemon.memory.conditions import conditions_of
 from positioner.daemon.memory.memory_file import SET_ASIDE, read_memory, write_memory
 from positioner.estimation.acceptance import Ratios
+from positioner.estimation.estimates import Directions
 from positioner.estimation.landings.breakaway_distance import BreakawayDistance, Interval
 from positioner.estimation.landings.landing_detector import Answers, SlideOutcome
 
@@ -65,6 +66,13 @@ def test_a_file_torn_at_any_byte_is_set_aside_and_never_half_used(path: Path) ->
         assert "\n" not in kept.problem
         assert not path.exists()
         assert path.with_name(NAME + SET_ASIDE).read_bytes() == whole[:length]
+
+
+@pytest.mark.parametrize("directions", list(Directions))
+def test_in_which_direction_friction_is_known_is_kept(path: Path, directions: Directions) -> None:
+    known = replace(KNOWLEDGE, ratios=replace(KNOWLEDGE.ratios, directions=directions))
+    write_memory(path, "FV-1", NOW, known)
+    assert read_memory(path, "FV-1", NOW).knowledge == known
 
 
 def test_killed_between_any_two_writes_the_old_or_the_new_is_left(path: Path, monkeypatch: pytest.MonkeyPatch) -> None:

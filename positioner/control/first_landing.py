@@ -1,0 +1,65 @@
+"""The first landing in a direction whose friction nobody has seen: by steps, whichever law commands before and after.
+
+An excitation that moves the stem one way says nothing of friction the other way, be it a preload or an unlike packing
+(`estimation/acceptance.py`). What a law would command in that direction is a guess. Where the stem might follow it,
+
+    d (p_law - p) > κ h / 2,    d (p_law - B(x, -d)) > 0
+
+the pressure goes that way in steps in its place, each once the stem rests under the one before:
+
+    p' = p + d κ max(h, λ d (r - x))
+
+p pressure in force, d direction, B balance (`Ratios.balance_pa`), κ = k_s/A, h = 1 % of stroke, λ = 0.4, r - x the way
+that is left. The stem breaks loose under a pressure that is at most one step beyond what it needs, so
+that it slides by its own jump and 0.4 of its way at the most.
+Where it lands φ_d = d (p - κ x) is known, and the law commands on from there.
+"""
+
+from positioner.estimation.acceptance import Ratios
+
+LEAST_STEP = 0.01
+"""h as a share of the stroke: a slide of twice what is seen for one (`landing_detector.VISIBLE`)."""
+SHARE = 0.4
+"""λ."""
+
+
+def needed(direction: int, ratios: Ratios, asked_pa: float, pressure_pa: float, at_m: float, stroke_m: float) -> bool:
+    """Return whether a stem might slide in a direction that was not seen by what a law asks for.
+
+    Args:
+        direction: that was not seen.
+        ratios: in use.
+        asked_pa: by the law.
+        pressure_pa: in force.
+        at_m: where the stem is.
+        stroke_m: full travel.
+    """
+    visible_pa = -ratios.b_over_c * LEAST_STEP * stroke_m / 2
+    goes_pa, over_pa = (
+        direction * (asked_pa - pressure_pa),
+        direction * (asked_pa - ratios.balance_pa(at_m, -direction)),
+    )
+    return goes_pa > visible_pa and over_pa > 0.0
+
+
+def goes_on(under_way: int, ratios: Ratios | None, way_m: float, *, asked_anew: bool) -> bool:
+    """Return whether steps in a direction go on: until the stem has landed, or is asked back the way that is known.
+
+    Args:
+        under_way: their direction, 0 none.
+        ratios: in use; None: no law commands.
+        way_m: from the stem to its reference.
+        asked_anew: whether the reference has changed.
+    """
+    unseen = ratios is not None and under_way == ratios.directions.unseen
+    return under_way != 0 and unseen and not (asked_anew and under_way * way_m <= 0.0)
+
+
+def stepped_pa(pressure_pa: float, direction: int, ratios: Ratios, way_m: float, stroke_m: float) -> float:
+    """Return the next pressure, Pa, for a stem that rests under one.
+
+    >>> stepped_pa(60e3, -1, Ratios(-8e5, -2e4), way_m=-0.03, stroke_m=0.1)
+    50400.0
+    """
+    step_m = max(LEAST_STEP * stroke_m, SHARE * direction * way_m)
+    return pressure_pa - direction * ratios.b_over_c * step_m
