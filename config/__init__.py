@@ -11,6 +11,7 @@ Its files:
     file_kinds                                    which of these a file is, where another is asked for
     file_stem                                     what the names of a valve's files begin with
     json_value                                    a result as JSON has it, which knows no NaN
+    toml_text                                     keys given new values in a text whose comments stay
     whole_file, lock_file                         replaces a file, or fills a folder, whole or not at all; a lock
     device, canopen_device                        table [device], on Modbus and on CANopen
     supervision_table, record_tables              tables [safety] and [supervision]; [recorder] and [history]

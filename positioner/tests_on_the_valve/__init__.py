@@ -10,6 +10,8 @@ registers, a cycle of the command's own, or virtual time. It needs numpy alone.
     breakout                        where a stem at rest breaks loose, and where it is back
     partial_stroke, credit          the partial stroke test; the credit that it may claim
     continuous_stroke               break-away friction in operation, by a command that creeps
+    small_steps                     dead band, resolution and step response, by small steps
+    commissioning                   from commands and a reading alone to what a daemon's file needs
     outcome                         figures, verdicts by their codes, picture; how they show themselves
     kept_records                    as found, as left, factory: kept, and what has changed since
 """

@@ -76,11 +76,25 @@ class OwnCycle:
             ),
         )
         self._rows.taken()
-        self._turn()
-        while cycle.snapshot.decision.experiment.commands:
-            self._turn()
+        try:
+            self._to_its_end()
+        except BaseException:
+            self._break_off()
+            raise
         state = cycle.snapshot.decision.experiment.state
         return Played(self._rows.taken(), state, "" if state in PLAYED else self._why(state))
+
+    def _to_its_end(self) -> None:
+        self._turn()
+        while self.cycle.snapshot.decision.experiment.commands:
+            self._turn()
+
+    def _break_off(self) -> None:
+        """Veto what is played, and go back to the command before; whoever interrupts that, leaves it where it is."""
+        asked = self.cycle.requests
+        self.cycle.requests = replace(asked, experiment=replace(asked.experiment, vetoed=True))
+        self._to_its_end()
+        self.cycle.requests = asked
 
     def _why(self, state: ExperimentState) -> str:
         fault = self.cycle.snapshot.decision.fault

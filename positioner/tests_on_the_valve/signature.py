@@ -18,6 +18,7 @@ Friction over travel is the half distance at the slowest rate, in bins of a tent
 Every +- is two standard deviations. With the diaphragm's area, forces follow in newtons.
 """
 
+from collections.abc import Sequence
 from dataclasses import dataclass, replace
 from itertools import pairwise
 from math import hypot, sqrt
@@ -131,13 +132,13 @@ def _without_motion(recordings: "list[Recording]", legs: list[Leg], plate: Namep
     if not legs:
         why = "no ramp in the recording: the command goes nowhere one way for most of what it spans"
         return Outcome("signature", plate.valve, (), (ValveTestVerdict.UNDETERMINED,), (why,))
-    supply = _supply_lacking(recordings)
+    supply = supply_lacking(recordings)
     verdict = ValveTestVerdict.NO_SUPPLY if supply else ValveTestVerdict.NOT_MOVED
     why = supply or "the stem did not follow the command: it is stuck, it has no supply, or the reading is another's"
     return Outcome("signature", plate.valve, (), (verdict,), (why,))
 
 
-def _supply_lacking(recordings: "list[Recording]") -> str:
+def supply_lacking(recordings: "Sequence[Recording]") -> str:
     """Say how far the measured pressure stays from the command where that is highest; empty where it does not."""
     for each in recordings:
         pressure_pa = each.columns.get("pressure_pa")

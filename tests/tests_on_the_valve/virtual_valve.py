@@ -6,6 +6,7 @@ from typing import Any
 from config.codes import Mode
 from config.daemon_file import DaemonFile
 from config.slave_file import Change, DeviceFault, Initial, Sensor, SlaveClock, SlaveFile, Supply
+from config.travel import ActionWord
 from config.valve_file import ValveFile, load_valve, shipped_valve
 from positioner.control.requests import ExperimentRequest, Requests
 from positioner.daemon.cycle import Cycle
@@ -58,14 +59,15 @@ class VirtualValve(OwnCycle):
         initial: Initial = MIDWAY,
         faults: tuple[DeviceFault, ...] = (),
         changes: tuple[Change, ...] = (),
-        supply_pa: float = MAXIMUM_PA,
+        action: ActionWord = "air_to_open",
     ) -> None:
         self.file = file or daemon_file()
         slave = SlaveFile(
             clock=SlaveClock(mode="lockstep", period_s=PERIOD_S),
             sensor=Sensor(noise_std_m=noise * STROKE_M, seed=seed),
             initial=initial,
-            supply=Supply(maximum_pa=supply_pa),
+            supply=Supply(maximum_pa=MAXIMUM_PA),
+            action=action,
             fault=faults,
             change=changes,
         )

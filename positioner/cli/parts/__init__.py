@@ -6,7 +6,7 @@ A command imports from here what it needs when it runs.
     flow_demo, flow_cases, flow_on_bus          `demo --loop flow`: what it says, its cases, one of them on wires
     demo_folder                                 where a demo leaves its files, and whose those there are
     daemon_address, experiment_player           where a daemon is; experiments played on its valve
-    valve_test                                  what the commands of tests on the valve share
+    valve_test, own_valve                       what tests on the valve share; a valve on a cycle of the command's own
     hidden_demo                                 `demo --hidden`: an effect found in the daemon's own recording
     csv_series, export_arguments, naming        series, historian's exports, and names of files in messages
     noise_argument, pressure_argument           `--noise-m`; `--from-pressure`

@@ -91,6 +91,12 @@ class RunningValve:
             ratio = float(dcs.get("b_over_c_applied"))
         return -ratio if ratio < 0.0 else None
 
+    def dead_band_pa(self) -> float | None:
+        """Return twice the friction over the area that the law works with, Pa; None while it knows none."""
+        with _dcs(self._arguments) as dcs:
+            ratio = float(dcs.get("k_over_c_applied"))
+        return -2.0 * ratio if ratio < 0.0 else None
+
     def play(self, program: "Program") -> "PlayedProgram":
         """Play a program and return what the daemon's recorder has of it."""
         from config.codes import ExperimentState

@@ -1,0 +1,127 @@
+"""`positioner commission`: from an I/P and a position reading alone to a file with which the daemon runs."""
+
+import argparse
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
+
+from positioner.cli.parts.config_argument import add_config, config_file
+from positioner.cli.parts.output_files import writable, write_json
+
+if TYPE_CHECKING:
+    from config.daemon_file import DaemonFile
+    from positioner.tests_on_the_valve.commissioning import Proposal
+
+HELP = "find what a daemon's file must say of its valve, and write it there after asking (moves it from end to end)"
+EXAMPLE = "positioner commission site.toml"
+
+WARNING = (
+    "The valve will go from end to end, several times, for some four minutes. Whatever it controls must bear that: "
+    "isolate it first."
+)
+STROKE_UNKNOWN_M = 1.0
+"""Stands in a file that says no stroke yet, until one is found."""
+
+
+def add_arguments(parser: argparse.ArgumentParser) -> None:
+    """Declare the command line."""
+    add_config(parser, text="a daemon's file; [valve] stroke_m may be missing, and the daemon must not run")
+    parser.add_argument("--valve", dest="name", metavar="NAME", help="which of that file's valves")
+    parser.add_argument("--yes", action="store_true", help="ask nothing: move it, and write what is found")
+    parser.add_argument("--keep", choices=("factory", "as_found", "as_left"), help="keep the outcome as this")
+    parser.add_argument("--json", type=Path, metavar="FILE", help="write verdict, figures and proposals as JSON")
+
+
+def run(arguments: argparse.Namespace) -> int:
+    """Commission, print, ask, write; 0 if it came to a file, else 1."""
+    import sys
+
+    from positioner.cli.parts.breaking_off import ended_as_by_ctrl_c
+    from positioner.cli.parts.own_valve import own_valve, unknown_travel
+    from positioner.cli.parts.valve_test import kept
+    from positioner.control.settings import Settings
+    from positioner.tests_on_the_valve.commissioning import commission
+
+    writable(arguments.json, "--json")
+    path = arguments.config = config_file(arguments)
+    file = _file(path, arguments.name)
+    print(WARNING)
+    if not _agreed("move it", arguments):
+        print("nothing was moved")
+        return 1
+    stranger = unknown_travel(file)
+    with ended_as_by_ctrl_c(), own_valve(stranger, path) as valve:
+        bounds = Settings.of(stranger).experiment
+        found = commission(valve, file.valve.name, bounds, lambda said: print(f"  {said}", file=sys.stderr, flush=True))
+    print(found.outcome.summary())
+    if arguments.json is not None:
+        write_json(arguments.json, found.outcome.as_json() | {"proposals": list(found.proposals)}, indent=1)
+    if arguments.keep is not None or not found.outcome.passed:
+        kept(found.outcome, file, arguments, arguments.keep or "")
+    if not found.proposals:
+        return 1
+    return _written(path, file, found.proposals, arguments)
+
+
+def _file(path: Path, name: str | None) -> "DaemonFile":
+    """Return the file, which may lack the stroke.
+
+    Raises:
+        InputError: as `load_daemon`, or it has several valves.
+    """
+    from config.daemon_file import DaemonFile, load_daemon
+    from config.errors import InputError
+    from config.file_kinds import require_kind
+    from config.loading import read_toml, validated
+
+    tables: dict[str, Any] = read_toml(path)
+    if isinstance(tables.get("valve"), list):
+        load_daemon(path, name)
+        raise InputError(str(path), "valve: several of them; commission each by a file of its own")
+    valve = dict(tables.get("valve") or {})
+    if "stroke_m" in valve:
+        return load_daemon(path, name)
+    require_kind(tables | {"valve": valve | {"stroke_m": STROKE_UNKNOWN_M}}, "daemon", str(path))
+    whole = {key: table for key, table in tables.items() if key != "law"}
+    return validated(DaemonFile, whole | {"valve": valve | {"stroke_m": STROKE_UNKNOWN_M}}, str(path), path.parent)
+
+
+def _written(path: Path, file: "DaemonFile", proposals: "tuple[Proposal, ...]", arguments: argparse.Namespace) -> int:
+    """Show what is proposed, ask, and write it; 0 if it was written."""
+    from config.daemon_file import load_daemon
+    from config.errors import InputError
+    from config.toml_text import with_values
+    from config.whole_file import replace_whole
+
+    by_valve = file.law is not None and file.law.valve is not None
+    told = [each for each in proposals if not (by_valve and each.table == "law")]
+    print(f"\nfor {path}:")
+    for each in told:
+        print(f"  {each.line}")
+    if by_valve:
+        print("  [law] stays: it names a valve file")
+    before = path.read_text(encoding="utf-8")
+    after = with_values(before, {(each.table, each.key): each.value for each in told}, str(path))
+    if not _agreed(f"write these into {path}", arguments):
+        print("nothing was written")
+        return 1
+    try:
+        replace_whole(path, after)
+        load_daemon(path, arguments.name)
+    except OSError as error:
+        raise InputError(str(path), f"cannot be written: {error.strerror}") from None
+    except InputError as error:
+        replace_whole(path, before)
+        raise InputError(str(path), f"is as it was, for with what was found it is refused: {error}") from None
+    print(f"written; next: positioner doctor {path}, positioner run {path}")
+    return 0
+
+
+def _agreed(what: str, arguments: argparse.Namespace) -> bool:
+    """Ask, unless --yes has answered; where nobody is there to answer, it is no."""
+    if arguments.yes:
+        return True
+    try:
+        return input(f"{what}? [y/N] ").strip().lower() in ("y", "yes")
+    except EOFError:
+        print()
+        return False

@@ -1,0 +1,47 @@
+"""`positioner steps`: dead band, resolution and step response of a running valve, by small steps of its command."""
+
+import argparse
+
+from positioner.cli.parts.valve_test import (
+    add_test_arguments,
+    bounds_of,
+    checked,
+    finished,
+    played_all,
+    playing,
+    recordings_of,
+)
+
+HELP = "dead band, resolution and step response by small steps of the command (moves it: state S3)"
+EXAMPLE = "positioner steps site.toml --held-s 2"
+
+
+def add_arguments(parser: argparse.ArgumentParser) -> None:
+    """Declare the command line."""
+    add_test_arguments(parser, recordings=False)
+    parser.add_argument(
+        "--dead-band-pa", type=float, metavar="PA", help="as expected (twice the friction that is known)"
+    )
+    parser.add_argument("--held-s", type=float, default=1.0, metavar="S", help="how long each step is held (1)")
+    parser.add_argument("--most", type=float, default=0.3, metavar="SHARE", help="travel that breaks it off (0.3)")
+
+
+def run(arguments: argparse.Namespace) -> int:
+    """Step, print dead band, resolution and times; 0 if both are bracketed, else 1."""
+    from config.errors import InputError
+    from positioner.cli.parts.experiment_player import RunningValve, require_ready
+    from positioner.tests_on_the_valve.small_steps import TEST, SmallSteps, programme, small_steps
+
+    file = checked(arguments)
+    assert file is not None
+    require_ready(file, arguments)
+    valve = RunningValve(file, arguments)
+    expected_pa = arguments.dead_band_pa or valve.dead_band_pa()
+    if expected_pa is None:
+        raise InputError("--dead-band-pa", "is required while the valve is not identified")
+    asked = SmallSteps(expected_pa, arguments.held_s, arguments.most)
+    program = programme(asked, bounds_of(file), valve.command_pa(), file.valve.stroke_m, str(arguments.config))
+    with playing(TEST, file, arguments):
+        (recording,) = recordings_of(played_all(valve, (program,)))
+    outcome = small_steps(recording, file.valve.name, file.valve.stroke_m, valve.slope_pa_per_m())
+    return finished(outcome, file, arguments)

@@ -1,0 +1,358 @@
+"""Commissioning: from commands and a position reading alone to what a daemon's file needs, in under five minutes.
+
+    watch           nothing moves: noise, quantum, creep
+    direction       the command creeps until the reading moves by a little, and back
+    slow ramps      over the whole range of commands, up and down, at two rates: travel, ends, bench set, spring,
+                    friction (`signature`); at such a pace the stem comes to its seat and to its stop
+    stroke times    the same way as fast as `[experiment] rate_limit_pa_per_s` permits
+    leak            at half travel the command is held: what creeps
+    small steps     dead band, resolution, the smallest move
+
+Each step is a program for the experiments and begins only after the one before came to its end; one that is broken off
+ends the commissioning under the command that was in force before it: never by venting.
+
+A reading that falls as the command rises is that of a valve which air closes, for it counts from the closed end.
+"""
+
+from collections.abc import Callable
+from dataclasses import dataclass, replace
+from math import ceil, floor, hypot, isfinite, log10, sqrt
+from typing import Protocol
+
+import numpy as np
+
+from config.codes import ValveTestVerdict
+from config.noise import quantum_m
+from config.recording import Column, Recording
+from config.travel import ActionWord
+from positioner.response.figure import Figure, undetermined
+from positioner.tests_on_the_valve import signature, small_steps
+from positioner.tests_on_the_valve.outcome import Outcome, Quantity
+from positioner.tests_on_the_valve.program import PLAYED, Bounds, Leap, Played, Player, Program, ramped
+
+TEST = "commissioning"
+WATCHED_S = 3.0
+CREEP_S = 30.0
+"""From the least command to the most, while the direction is sought."""
+SLOW_LEG_S = 20.0
+STROKE_HELD_S = 6.0
+LEAK_S = 12.0
+SETTLING_S = 3.0
+"""Of these, after which the stem rests."""
+MOVED_SIGMA, MOVED_QUANTA, MOVED_LEAST_M = 10.0, 20.0, 1e-4
+"""How far the reading must go to have moved: deviations of its noise, its digits, m."""
+ARRIVED = 0.98
+"""Of the travel: a stroke is over."""
+MARGIN = 0.15
+"""Of the bench set's span, above the command that takes the stem to its upper end: what presses it there."""
+SUPPLY_MARGIN = 0.05
+"""Of the same: with less the supply is hardly enough."""
+ROUNDED_PA = 1000.0
+ZERO_OFF = 0.01
+"""Of the travel: a reading at the closed end that is farther from 0 is off."""
+
+
+class Watching(Player, Protocol):
+    """A valve that can be watched, too."""
+
+    def watch(self, for_s: float) -> Recording | None:
+        """Return what is measured for a while under the command that is held."""
+        ...
+
+
+@dataclass(frozen=True, slots=True)
+class Proposal:
+    """A key of the daemon's file with the value that fits, and why."""
+
+    table: str
+    key: str
+    value: float | str
+    reason: str
+
+    @property
+    def line(self) -> str:
+        """As it stands in the file."""
+        value = f'"{self.value}"' if isinstance(self.value, str) else f"{self.value:.6g}"
+        return f"{self.table}.{self.key} = {value}: {self.reason}"
+
+
+@dataclass(frozen=True, slots=True)
+class Commissioned:
+    """What was found, and what is proposed; nothing is where it came to nothing."""
+
+    outcome: Outcome
+    proposals: tuple[Proposal, ...] = ()
+
+
+class _Ended(Exception):
+    """A step that came to no good end: its verdict and why."""
+
+    def __init__(self, verdict: ValveTestVerdict, why: str) -> None:
+        super().__init__(why)
+        self.verdict, self.why = verdict, why
+
+
+def commission(
+    valve: Watching, name: str, bounds: Bounds, show: Callable[[str], None] = lambda _: None
+) -> Commissioned:
+    """Commission a valve.
+
+    Args:
+        valve: on which programs are played.
+        name: of the valve.
+        bounds: pressures, rate and time that programs stay inside; the travel is not known yet.
+        show: told what is done.
+    """
+    try:
+        return _commissioned(valve, name, bounds, show)
+    except _Ended as ended:
+        return Commissioned(Outcome(TEST, name, (), (ended.verdict,), (ended.why,)))
+
+
+def _commissioned(valve: Watching, name: str, bounds: Bounds, show: Callable[[str], None]) -> Commissioned:
+    show("watching")
+    noise_m, digit_m, creep = _watched(valve.watch(WATCHED_S))
+    start_pa = valve.command_pa()
+    sign = _direction(valve, bounds, start_pa, max(MOVED_SIGMA * noise_m, MOVED_QUANTA * digit_m, MOVED_LEAST_M), show)
+    recordings = _ramps(valve, bounds, start_pa, sign, show)
+    if lacking := signature.supply_lacking(recordings):  # a stem that waits for air looks as one on its stop
+        raise _Ended(ValveTestVerdict.NO_SUPPLY, lacking)
+    found = signature.signature(recordings, signature.Nameplate(name, 1.0))
+    travel, low, high = (found.figure(each) for each in ("travel_m", "low_m", "high_m"))
+    if travel.value is None or low.value is None or high.value is None:
+        supply = ValveTestVerdict.NO_SUPPLY if high.value is None else ValveTestVerdict.UNDETERMINED
+        raise _Ended(
+            supply, f"{high.reason or low.reason}: more supply, or a lower [pressure] minimum_pa, may take it there"
+        )
+    bench = [found.figure(each) for each in ("bench_low_pa", "bench_high_pa")]
+    friction = found.figure("friction_pa")
+    ends = (low.value, high.value)
+    up_s, down_s = _stroke_times(_played(valve, _strokes(bounds, start_pa), show), sign, ends, noise_m)
+    half_pa = 0.5 * sum(each.value or 0.0 for each in bench)
+    leak = _leak(_played(valve, _held(bounds, start_pa, half_pa), show), sign)
+    steps = _steps(valve, bounds, start_pa, half_pa, friction, (travel.value, sign, name), show)
+    action: ActionWord = "air_to_open" if sign > 0 else "air_to_close"
+    opening, closing = (up_s, down_s) if sign > 0 else (down_s, up_s)
+    closed_m = low.value if sign > 0 else -high.value
+    adequate, notes = _supply(found, bounds)
+    if abs(closed_m) > ZERO_OFF * travel.value:
+        notes.append(f"the reading at the closed end is {1e3 * closed_m:.3g} mm: its zero is off, set it in the device")
+    quantities = (
+        Quantity(
+            "closed_m", "reading at the closed end", "m", Figure(closed_m, (low if sign > 0 else high).plus_minus)
+        ),
+        *(each for each in found.quantities if each.name not in LEFT_OUT),
+        Quantity("opening_s", "opens within", "s", opening),
+        Quantity("closing_s", "closes within", "s", closing),
+        Quantity("supply_margin", "commands above what the upper end needs, of the span", "1", adequate),
+        Quantity("leak_m_per_s", "creep with the command held", "m/s", leak),
+        *(each for each in steps.quantities if each.name in ("dead_band_pa", "resolution_pa", "least_move_m")),
+        Quantity("noise_at_rest_m", "noise at rest", "m", Figure(noise_m)),
+        Quantity("digit_m", "digit of the reading", "m", Figure(digit_m)),
+        Quantity("creep_m", "creep before anything was commanded", "m", Figure(creep)),
+    )
+    outcome = Outcome(
+        TEST,
+        name,
+        quantities,
+        (ValveTestVerdict.PASSED,),
+        (f"more air {'opens' if sign > 0 else 'closes'} it", *notes, *found.notes[-2:-1]),
+        found.tables,
+        found.picture,
+    )
+    return Commissioned(outcome, tuple(_proposals(outcome, action, bounds)))
+
+
+LEFT_OUT = frozenset({"low_m", "high_m", "noise_m", "friction_at_rate_pa", "dynamic_error_band_mean"})
+
+
+def _watched(recording: Recording | None) -> tuple[float, float, float]:
+    """Return noise, digit and creep of the reading, m."""
+    if recording is None or len(recording) < 8:
+        raise _Ended(ValveTestVerdict.UNDETERMINED, "no good measurement: positioner doctor says more")
+    x, t = recording.position_m, recording.time_s - recording.time_s[0]
+    slope, level = np.polyfit(t, x, 1)
+    return float(np.std(x - slope * t - level, ddof=2)), quantum_m(x) or 0.0, float(slope * t[-1])
+
+
+def _played(valve: Watching, program: Program, show: Callable[[str], None]) -> Recording:
+    show(f"{program.name}, {program.lasts_s:.0f} s")
+    return _recording_of(valve.play(program))
+
+
+def _recording_of(played: Played) -> Recording:
+    if played.state not in PLAYED or played.recording is None:
+        raise _Ended(
+            ValveTestVerdict.BROKEN_OFF, f"{played.problem or 'nothing was recorded'}; the command before is held"
+        )
+    return played.recording
+
+
+def _direction(valve: Watching, bounds: Bounds, start_pa: float, moved_m: float, show: Callable[[str], None]) -> float:
+    """Return whether the reading rises, 1, or falls, -1, with the command."""
+    rate = (bounds.maximum_pa - bounds.minimum_pa) / CREEP_S
+    first = 1.0 if start_pa < 0.5 * (bounds.minimum_pa + bounds.maximum_pa) else -1.0
+    for way in (first, -first):
+        limit_pa = bounds.maximum_pa if way > 0 else bounds.minimum_pa
+        program = ramped("direction", start_pa, (Leap(start_pa, 1.0), Leap(limit_pa, 0.5)), rate, turn_m=moved_m)
+        recording = _played(valve, program, show)
+        gone = recording.position_m - float(np.median(recording.position_m[:5]))
+        farthest = float(gone[int(np.argmax(np.abs(np.convolve(gone, np.ones(5) / 5.0, "same"))))])
+        if abs(farthest) > 0.5 * moved_m:
+            return way * float(np.sign(farthest))
+    lacking = signature.supply_lacking([recording])
+    if lacking:
+        raise _Ended(ValveTestVerdict.NO_SUPPLY, lacking)
+    raise _Ended(
+        ValveTestVerdict.NOT_MOVED, "over the whole range of commands the reading stands still: stuck, or no supply"
+    )
+
+
+def _ramps(
+    valve: Watching, bounds: Bounds, start_pa: float, sign: float, show: Callable[[str], None]
+) -> list[Recording]:
+    short = replace(bounds, longest_s=min(bounds.longest_s, 4.0 * SLOW_LEG_S / 0.95 + 5.0))
+    slow, _, fast = signature.programmes(short, start_pa)
+    return [_mirrored(_played(valve, each, show), sign) for each in (slow, fast)]
+
+
+def _mirrored(recording: Recording, sign: float) -> Recording:
+    """Return it with a reading that rises with the command."""
+    return Recording(recording.columns | {"position_m": sign * recording.position_m}, recording.metadata)
+
+
+def _strokes(bounds: Bounds, start_pa: float) -> Program:
+    low, high = bounds.minimum_pa, bounds.maximum_pa
+    leaps = (Leap(low, STROKE_HELD_S), Leap(high, STROKE_HELD_S), Leap(low, STROKE_HELD_S), Leap(start_pa, 0.5))
+    return ramped("stroke times", start_pa, leaps, bounds.rate_pa_per_s)
+
+
+def _stroke_times(
+    recording: Recording, sign: float, ends: tuple[float, float], noise_m: float
+) -> tuple[Figure, Figure]:
+    """Return the times from the change of the command until the stem is there, upwards and downwards, s."""
+    t, p, x = recording.time_s, recording.command_pa, sign * recording.position_m
+    low, high = ends
+    at_low = np.flatnonzero(p <= p.min() + 1e-6 * np.ptp(p))
+    at_high = np.flatnonzero(p >= p.max() - 1e-6 * np.ptp(p))
+    gap_s = float(np.median(np.diff(t)))
+    before_up = at_low[at_low < at_high[0]]
+    after = at_low[at_low > at_high[-1]]
+    if not before_up.size or not after.size:
+        lost = undetermined("the command did not stay at its ends")
+        return lost, lost
+    level = min(ARRIVED, 1.0 - 3.0 * noise_m / (high - low))
+
+    def arrival(first: int, last: int, gone: Column) -> Figure:
+        there = np.flatnonzero(gone[first:last] >= level)
+        if not there.size:
+            return undetermined(f"longer than the {float(t[last - 1] - t[first]):.3g} s that were waited")
+        return Figure(float(t[first + int(there[0])] - t[first]), gap_s)
+
+    share = (x - low) / (high - low)
+    up = arrival(int(before_up[-1]), int(at_high[-1]) + 1, share)
+    down = arrival(int(at_high[-1]), int(after[-1]) + 1, 1.0 - share)
+    return up, down
+
+
+def _held(bounds: Bounds, start_pa: float, half_pa: float) -> Program:
+    return ramped("leak", start_pa, (Leap(half_pa, LEAK_S), Leap(start_pa, 0.5)), bounds.rate_pa_per_s)
+
+
+def _leak(recording: Recording, sign: float) -> Figure:
+    """Return how fast the stem creeps while the command is held, m/s."""
+    p, t = recording.command_pa, recording.time_s
+    held = np.flatnonzero(np.abs(np.diff(p, prepend=p[0])) < 1e-9 * max(1.0, float(np.max(np.abs(p)))))
+    runs = np.split(held, np.flatnonzero(np.diff(held) > 1) + 1)
+    rows = max(runs, key=len)
+    rows = rows[t[rows] >= t[rows[0]] + SETTLING_S]
+    if len(rows) < 8:
+        return undetermined("too few samples under the command held")
+    at_s, x = t[rows] - t[rows[0]], sign * recording.position_m[rows]
+    slope, level = np.polyfit(at_s, x, 1)
+    left_m = float(np.std(x - slope * at_s - level, ddof=2))
+    return Figure(float(slope), 2.0 * left_m / (float(np.std(at_s)) * sqrt(len(x))))
+
+
+def _steps(
+    valve: Watching,
+    bounds: Bounds,
+    start_pa: float,
+    half_pa: float,
+    friction: Figure,
+    of: tuple[float, float, str],
+    show: Callable[[str], None],
+) -> Outcome:
+    """Return the outcome of small steps about half travel."""
+    travel_m, sign, name = of
+    asked = small_steps.SmallSteps(max(1.0, 2.0 * (friction.value or 0.0)))
+    program = small_steps.programme(replace(asked, most=0.9), bounds, half_pa, travel_m)
+    way_s = abs(half_pa - start_pa) / bounds.rate_pa_per_s
+    shifted = tuple((way_s + 1e-3 + time_s, pressure_pa) for time_s, pressure_pa in program.points)
+    back_s = abs(half_pa - start_pa) / bounds.rate_pa_per_s
+    points = ((0.0, start_pa), *shifted, (shifted[-1][0] + back_s + 1e-3, start_pa))
+    recording = _played(valve, Program("small steps", points), show)
+    return small_steps.small_steps(_mirrored(recording, sign), name, travel_m)
+
+
+def _supply(found: Outcome, bounds: Bounds) -> tuple[Figure, list[str]]:
+    """Return the commands above what takes the stem to its upper end, over the bench set's span; and what is wrong."""
+    low, high = (found.figure(each) for each in ("bench_low_pa", "bench_high_pa"))
+    friction = found.figure("friction_pa")
+    if low.value is None or high.value is None or friction.value is None:
+        return undetermined("the bench set is not known"), []
+    span_pa = high.value - low.value
+    margin = (bounds.maximum_pa - high.value - friction.value) / span_pa
+    error = hypot(high.plus_minus or 0.0, friction.plus_minus or 0.0) / span_pa
+    notes = []
+    if margin < SUPPLY_MARGIN:
+        notes.append("the supply is hardly enough to hold the stem at its upper end")
+    return Figure(margin, error), notes
+
+
+def _proposals(outcome: Outcome, action: ActionWord, bounds: Bounds) -> list[Proposal]:
+    travel, slope, friction = (outcome.figure(each) for each in ("travel_m", "spring_pa_per_m", "friction_pa"))
+    low, high = (outcome.figure(each) for each in ("bench_low_pa", "bench_high_pa"))
+    opens = action == "air_to_open"
+    told = [
+        Proposal("valve", "stroke_m", _rounded(travel.value, travel.plus_minus), "the travel from end to end"),
+        Proposal(
+            "valve", "action", action, f"the reading {'rises' if action == 'air_to_open' else 'falls'} with the command"
+        ),
+    ]
+    if high.value is not None and low.value is not None and friction.value is not None:
+        enough_pa = high.value + friction.value + MARGIN * (high.value - low.value)
+        enough_pa = ROUNDED_PA * ceil(enough_pa / ROUNDED_PA)
+        if enough_pa < bounds.maximum_pa:
+            why = "takes the stem to its upper end and presses it there by 15 % of the bench set"
+            told.append(Proposal("pressure", "maximum_pa", enough_pa, why))
+    if slope.value and low.value is not None and friction.value and isfinite(slope.value):
+        # The law counts from the low end of the stem, where the reading of a valve may be off its zero.
+        closed_m = outcome.figure("closed_m").value or 0.0
+        at_zero_pa = low.value - (1.0 if opens else -1.0) * slope.value * closed_m
+        told += [
+            Proposal(
+                "law",
+                "b_over_c_pa_per_m",
+                -_rounded(slope.value, slope.plus_minus),
+                "less the spring rate over the area",
+            ),
+            Proposal(
+                "law", "k_over_c_pa", -_rounded(friction.value, friction.plus_minus), "less the friction over the area"
+            ),
+            Proposal("law", "offset_pa", _rounded(at_zero_pa, low.plus_minus), "the bench set's lower end"),
+        ]
+    return told
+
+
+def _rounded(value: float | None, plus_minus: float | None) -> float:
+    """Return a value to the digit that its uncertainty leaves, and one more.
+
+    >>> _rounded(0.0400437, 0.0001), _rounded(1999312.0, 4100.0)
+    (0.04004, 1999300.0)
+    """
+    assert value is not None
+    if not plus_minus:
+        return float(f"{value:.6g}")
+    digit = 10.0 ** (floor(log10(plus_minus)) - 1)
+    return float(f"{round(value / digit) * digit:.6g}")

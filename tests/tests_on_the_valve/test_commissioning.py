@@ -1,0 +1,199 @@
+"""Commissioning of a valve that nobody has described, in virtual time; and the file that it writes."""
+
+from collections.abc import Iterator
+from contextlib import contextmanager
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from config.codes import Fault, ValveTestVerdict
+from config.daemon_file import DaemonFile, load_daemon
+from config.slave_file import DeviceFault, Initial
+from config.toml_text import with_values
+from config.travel import ActionWord
+from positioner.cli.main import main
+from positioner.cli.parts.own_valve import unknown_travel
+from positioner.control.settings import Settings
+from positioner.tests_on_the_valve.commissioning import Commissioned, commission
+from positioner.tests_on_the_valve.small_steps import SmallSteps, programme, small_steps
+from tests.control.virtual_loop import VirtualLoop
+from tests.tests_on_the_valve.virtual_valve import (
+    AREA_M2,
+    MAXIMUM_PA,
+    MIDWAY,
+    PERIOD_S,
+    PRELOAD_N,
+    SLOPE,
+    STROKE_M,
+    VirtualValve,
+    daemon_file,
+    told,
+)
+
+UNKNOWN = unknown_travel(daemon_file())
+BOUNDS = Settings.of(UNKNOWN).experiment
+SITE = f"""# FV-1, behind the boiler
+[valve]
+name = "FV-1"     # as the plant calls it
+
+[cycle]
+pace = "device"
+
+[pressure]
+maximum_pa = {MAXIMUM_PA}   # the regulator's
+
+[safety]
+stale_after_s = 0.5
+"""
+
+
+def commissioned(**valve: object) -> tuple[Commissioned, VirtualValve]:
+    stranger = VirtualValve(file=UNKNOWN, **valve)  # type: ignore[arg-type]
+    return commission(stranger, "FV-1", BOUNDS), stranger
+
+
+@contextmanager
+def written(folder: Path, action: ActionWord, monkeypatch: pytest.MonkeyPatch) -> Iterator[tuple[Path, VirtualValve]]:
+    """Commission by the command, on a valve in memory in place of one on a bus."""
+    site = folder / "site.toml"
+    site.write_text(SITE)
+    initial = MIDWAY if action == "air_to_open" else Initial()
+    stranger = VirtualValve(file=UNKNOWN, noise=1e-3, action=action, initial=initial)
+
+    @contextmanager
+    def in_memory(_file: DaemonFile, _source: Path) -> Iterator[VirtualValve]:
+        yield stranger
+
+    monkeypatch.setattr("positioner.cli.parts.own_valve.own_valve", in_memory)
+    yield site, stranger
+
+
+@pytest.mark.parametrize("action", ["air_to_open", "air_to_close"])
+def test_a_valve_that_nobody_has_described_runs_after_it(
+    action: ActionWord, tmp_path: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
+) -> None:
+    with written(tmp_path, action, monkeypatch) as (site, stranger):
+        begun_s = stranger.cycle.snapshot.sample.time_s
+        assert main(["commission", str(site), "--yes"]) == 0, capsys.readouterr().err
+        assert stranger.cycle.snapshot.sample.time_s - begun_s < 300.0
+    assert "# FV-1, behind the boiler" in site.read_text()
+    assert 'name = "FV-1"     # as the plant calls it' in site.read_text()
+    assert "# the regulator's" in site.read_text()
+    file = load_daemon(site)
+    assert file.valve.stroke_m == pytest.approx(STROKE_M, rel=5e-3)
+    assert file.valve.action == action
+    assert file.law is not None
+    assert file.law.b_over_c_pa_per_m == pytest.approx(-SLOPE, rel=0.01)
+    assert file.law.offset_pa == pytest.approx((PRELOAD_N + 0.12 * 207.5) / AREA_M2, rel=0.02)
+    loop = VirtualLoop(file, stranger.device)
+    for opening in (0.3, 0.7, 0.65):
+        loop.refer_to(file.valve.travel.stem_m(opening) / file.valve.stroke_m, 15.0)
+        stem_m = stranger.device.stem_m
+        assert file.valve.travel.opening(stem_m) == pytest.approx(opening, abs=0.01)
+
+
+def test_where_nobody_agrees_nothing_is_moved_nor_written(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
+) -> None:
+    with written(tmp_path, "air_to_open", monkeypatch) as (site, stranger):
+        monkeypatch.setattr("builtins.input", lambda _: "n")
+        assert main(["commission", str(site)]) == 1
+        assert "nothing was moved" in capsys.readouterr().out
+        assert stranger.device.samples == 3 + 1  # those of its own start
+    assert site.read_text() == SITE
+
+
+def stuck() -> Commissioned:
+    return commissioned(valve=told(coulomb_n=9e3, static_n=9.5e3))[0]
+
+
+def unsupplied() -> Commissioned:
+    return commissioned(faults=(DeviceFault(kind="supply", at_s=0.0, to_pa=61e3),))[0]
+
+
+@pytest.mark.parametrize(
+    ("bad", "verdict"), [(stuck, ValveTestVerdict.NOT_MOVED), (unsupplied, ValveTestVerdict.NO_SUPPLY)]
+)
+def test_what_is_wrong_ends_it_in_a_code_and_proposes_nothing(bad: object, verdict: ValveTestVerdict) -> None:
+    found = bad()  # type: ignore[operator]
+    assert (found.outcome.verdicts, found.proposals) == ((verdict,), ())
+
+
+def test_a_fault_on_the_way_ends_it_under_the_command_in_force_never_vented() -> None:
+    found, valve = commissioned(faults=(DeviceFault(kind="nan", at_s=40.0, over_s=5.0),))
+    assert found.outcome.verdicts == (ValveTestVerdict.BROKEN_OFF,)
+    assert "fault: a measurement that cannot be" in found.outcome.notes[0]
+    assert valve.cycle.snapshot.decision.fault is Fault.IMPLAUSIBLE
+    held_pa = valve.command_pa()
+    valve.watch(5.0)
+    assert valve.command_pa() == held_pa > 0.0
+
+
+def test_who_interrupts_it_gets_the_command_before_back() -> None:
+    valve = VirtualValve(file=UNKNOWN)
+    held_pa, turn, count = valve.command_pa(), valve._turn, 0
+
+    def interrupted() -> None:
+        nonlocal count
+        count += 1
+        if count == 1000:
+            raise KeyboardInterrupt
+        turn()
+
+    valve._turn = interrupted
+    with pytest.raises(KeyboardInterrupt):
+        commission(valve, "FV-1", BOUNDS)
+    assert valve.command_pa() == held_pa
+    assert not valve.cycle.snapshot.decision.experiment.commands
+
+
+def test_a_daemon_that_serves_the_valve_is_in_service(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    import socket
+
+    with socket.create_server(("127.0.0.1", 0)) as served:
+        site = tmp_path / "site.toml"
+        site.write_text(f"[valve]\nstroke_m = 0.04\n[supervisory]\nport = {served.getsockname()[1]}\n")
+        assert main(["commission", str(site), "--yes"]) == 1
+    assert "the valve is in service; end that daemon first" in capsys.readouterr().err
+
+
+@pytest.mark.parametrize(
+    ("text", "values", "expected"),
+    [
+        ("", {("valve", "stroke_m"): 0.04}, "[valve]\nstroke_m = 0.04\n"),
+        ("[a]\nx = 1 # one\n[b]\nx = 2\n", {("b", "x"): 3}, "[a]\nx = 1 # one\n[b]\nx = 3\n"),
+        ('[a]\n  s = "x # y"  # why\n', {("a", "s"): "z"}, '[a]\n  s = "z"  # why\n'),
+        ("[a]\n[b]\n", {("a", "x"): 1.5}, "[a]\nx = 1.5\n[b]\n"),
+    ],
+)
+def test_values_go_into_a_text_whose_comments_stay(
+    text: str, values: dict[tuple[str, str], float | str], expected: str
+) -> None:
+    assert with_values(text, values).lstrip("\n") == expected
+
+
+@pytest.mark.parametrize("text", ["a = { x = 1 }\n", "a.x = 1\n", "[[a]]\nx = 1\n", "[a]\nx = [\n 1 ]\n"])
+def test_a_text_that_cannot_be_changed_by_a_line_is_refused(text: str) -> None:
+    from config.errors import InputError
+
+    with pytest.raises(InputError, match="by hand"):
+        with_values(text, {("a", "x"): 2})
+
+
+def test_small_steps_bracket_dead_band_and_resolution() -> None:
+    """Break-away both ways: 2 F_s less what a slide has left; onward: what a slide leaves, F_s - F_c as it lands."""
+    valve = VirtualValve(told(coulomb_n=400.0, static_n=440.0))
+    asked = SmallSteps(2.0 * 420.0 / AREA_M2)
+    program = programme(asked, Settings.of(valve.file).experiment, valve.command_pa(), STROKE_M)
+    played = valve.play(program)
+    assert played.recording is not None
+    outcome = small_steps(played.recording, "FV-1", STROKE_M, SLOPE)
+    assert outcome.verdicts == (ValveTestVerdict.PASSED,)
+    dead_band, resolution = outcome.figure("dead_band_pa"), outcome.figure("resolution_pa")
+    assert dead_band.value is not None
+    assert dead_band.value + (dead_band.plus_minus or 0.0) > 2.0 * 400.0 / AREA_M2
+    assert dead_band.value - (dead_band.plus_minus or 0.0) < 2.0 * 440.0 / AREA_M2
+    assert (resolution.value or 0.0) < 2.0 * 40.0 / AREA_M2 + 2.0 * asked.dead_band_pa / 10.0
+    assert (np.diff([time_s for time_s, _ in program.points]) > 0.0).all()
+    assert program.lasts_s < 100.0 / PERIOD_S
