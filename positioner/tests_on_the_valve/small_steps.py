@@ -14,7 +14,8 @@ from statistics import median
 
 from config.codes import ValveTestVerdict
 from config.errors import InputError
-from config.recording import Recording
+from config.recording import Column, Recording
+from positioner.response.dead_band import responded
 from positioner.response.figure import Figure, undetermined
 from positioner.response.response_figures import respond
 from positioner.tests_on_the_valve.outcome import Curve, Outcome, Picture, Quantity
@@ -85,9 +86,10 @@ def programme(
 
 def small_steps(recording: Recording, valve: str, stroke_m: float, slope_pa_per_m: float | None = None) -> Outcome:
     """Return what the steps show; the slope is the spring rate over the area, where it is known."""
-    told = {name: recording.columns[name] for name in ("time_s", "command_pa", "position_m")}
-    response = respond(Recording(told))
-    moved = [each for each in response.steps if each.moved]
+    told = {name: recording.columns[name] for name in ("time_s", "position_m")}
+    response = respond(Recording(told | {"command_pa": _in_steps(recording.command_pa)}))
+    gain = response.static_gain.value
+    moved = [each for each in response.steps if gain and responded(each, gain)]
     quantities = [
         Quantity("dead_band_pa", "dead band", "Pa", response.dead_band),
         Quantity("resolution_pa", "resolution", "Pa", response.resolution),
@@ -110,6 +112,14 @@ def small_steps(recording: Recording, valve: str, stroke_m: float, slope_pa_per_
         ),
     )
     return Outcome(TEST, valve, tuple(quantities), (verdict,), tuple(response.notes), picture=picture)
+
+
+def _in_steps(command_pa: Column) -> Column:
+    """Return a command without the samples on the way from one level to the next, which are the next one's."""
+    steps = command_pa.copy()
+    on_the_way = (steps[1:-1] != steps[:-2]) & (steps[1:-1] != steps[2:])
+    steps[1:-1][on_the_way] = steps[2:][on_the_way]
+    return steps
 
 
 TIMES = (("dead_time_s", "dead time"), ("t63_s", "T63"), ("t86_s", "T86, step response time"))
