@@ -218,7 +218,7 @@ def _ramps(
 
 def _mirrored(recording: Recording, sign: float) -> Recording:
     """Return it with a reading that rises with the command."""
-    return Recording(recording.columns | {"position_m": sign * recording.position_m}, recording.metadata)
+    return Recording(dict(recording.columns) | {"position_m": sign * recording.position_m}, recording.metadata)
 
 
 def _strokes(bounds: Bounds, start_pa: float) -> Program:
