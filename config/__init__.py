@@ -15,6 +15,7 @@ Its files:
     whole_file, lock_file                         replaces a file, or fills a folder, whole or not at all; a lock
     device, canopen_device                        table [device], on Modbus and on CANopen
     supervision_table, record_tables              tables [safety] and [supervision]; [recorder] and [history]
+    alarm_table, alarm_advice                     table [alarms]; what somebody does about an alarm
     hosts, serial_port, tls_table                 where it is, and how it is secured
     bus_plugins, law_names, extras                buses of other packages; laws; which package is not installed
     quantities, modbus_map, register_format       what a device measures and obeys; its registers; values in words

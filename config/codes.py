@@ -274,6 +274,22 @@ class Ne107Cause(Code):
     NOT_AT_REST = 19, "the stem does not come to rest"
     PRESSURE_ELSEWHERE = 20, "the measured pressure is not the one commanded"
     ONE_DIRECTION = 21, "one direction identified: how far a move goes the other way is not known"
+    HIGH_HIGH = 22, "opening above its highest limit"
+    HIGH = 23, "opening above its high limit"
+    LOW = 24, "opening below its low limit"
+    LOW_LOW = 25, "opening below its lowest limit"
+    TEST_OVERDUE = 26, "a test on the valve is overdue"
+    MODEL_CHANGED = 27, "the spring is not the one identified first"
+
+
+class AlarmState(Code):
+    """What becomes of an alarm (ISA-18.2)."""
+
+    NORMAL = 0, "normal"
+    UNACKNOWLEDGED = 1, "active, unacknowledged"
+    ACKNOWLEDGED = 2, "active, acknowledged"
+    RETURNED = 3, "returned to normal, unacknowledged"
+    SHELVED = 4, "shelved"
 
 
 class EventKind(Code):
@@ -300,6 +316,11 @@ class EventKind(Code):
     CLOCK_SET = 18, "the gateway's clock was set"
     LOCKED_OUT = 19, "the local switch locks out whoever writes from afar"
     LET_IN = 20, "the local switch lets writes in again"
+    ALARM_RAISED = 21, "an alarm is raised"
+    ALARM_RETURNED = 22, "an alarm has returned to normal"
+    ALARM_ACKNOWLEDGED = 23, "an alarm is acknowledged"
+    ALARM_SHELVED = 24, "an alarm is shelved"
+    ALARM_UNSHELVED = 25, "an alarm is shelved no more"
 
 
 CAUSES: dict[EventKind, type[Code]] = {
@@ -313,6 +334,11 @@ CAUSES: dict[EventKind, type[Code]] = {
     EventKind.NOT_IDENTIFIED: Refusal,
     EventKind.RESTORED: Restored,
     EventKind.EXPERIMENT: ExperimentState,
+    EventKind.ALARM_RAISED: Ne107Cause,
+    EventKind.ALARM_RETURNED: Ne107Cause,
+    EventKind.ALARM_ACKNOWLEDGED: Ne107Cause,
+    EventKind.ALARM_SHELVED: Ne107Cause,
+    EventKind.ALARM_UNSHELVED: Ne107Cause,
 }
 """The code of an event's cause; of a kind that is not here the cause is 0, and a text says it."""
 NO_CAUSE = (InhibitReason.NOTHING, Ne107Cause.NONE)

@@ -15,6 +15,7 @@ from typing import Annotated, Any, Literal, Self
 
 from pydantic import AfterValidator, BeforeValidator, Field, IPvAnyNetwork, model_validator
 
+from config.alarm_table import AlarmsTable
 from config.bus_plugins import AnyDevice
 from config.device import Host, ModbusDevice, ModbusTcpDevice
 from config.errors import InputError
@@ -312,6 +313,7 @@ class DaemonFile(Schema):
     supervisory: SupervisoryTable = SupervisoryTable()
     recorder: RecorderTable | None = None
     health: HealthTable = HealthTable()
+    alarms: AlarmsTable = AlarmsTable()
     memory: MemoryTable = MemoryTable()
     history: HistoryTable | None = None
     log: LogTable = LogTable()

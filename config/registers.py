@@ -311,7 +311,19 @@ EVENTS = (
     Register("history_lost", 708, "uint32", "1", "entries of the history that were lost since the start"),
 )
 
-REGISTERS = (*COMMANDS, *STATUS, *ESTIMATES, *STATISTICS, *IDENTITY, *HEALTH, *EXPERIMENT, *EVENTS)
+_ALARM_BITS = "bit n - 1 is cause n of ne107_cause"
+
+ALARMS = (
+    _operable("alarm_acknowledge", 800, "uint16", "1", 1, 32, "write a cause (ne107_cause): its alarm is seen"),
+    _operable("alarm_shelve", 801, "uint16", "1", 1, 32, "which alarm is put aside; written together with the time"),
+    _operable("alarm_shelve_time", 802, "float32", "s", 0.0, 1e7, "for how long; 0: it is shown again"),
+    Register("alarms_active", 804, "uint32", "1", f"alarms that hold and are not shelved: {_ALARM_BITS}"),
+    Register("alarms_unacknowledged", 806, "uint32", "1", f"alarms that nobody has seen: {_ALARM_BITS}"),
+    Register("alarms_shelved", 808, "uint32", "1", f"alarms put aside: {_ALARM_BITS}"),
+    Register("alarms_shelved_until", 810, "uint32", "s", "when the first of them is shown again, since 1970; 0: none"),
+)
+
+REGISTERS = (*COMMANDS, *STATUS, *ESTIMATES, *STATISTICS, *IDENTITY, *HEALTH, *EXPERIMENT, *EVENTS, *ALARMS)
 
 BY_NAME = {register.name: register for register in REGISTERS}
 

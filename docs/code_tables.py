@@ -6,7 +6,7 @@
 from dataclasses import fields
 from pathlib import Path
 
-from config.codes import CAUSES, Code, EventKind, Ne107Cause, Ne107Status, Refusal, ValveTestVerdict
+from config.codes import CAUSES, AlarmState, Code, EventKind, Ne107Cause, Ne107Status, Refusal, ValveTestVerdict
 from positioner.control.laws.slides.states import State
 from positioner.control.laws.slides.transitions import COMMANDING, TABLE
 from positioner.control.permissives import table as permissives
@@ -37,6 +37,7 @@ SERVED: dict[type[Code], str] = {code: register for register, code in CODES.item
     Refusal: "*_reason, refusal",
     Ne107Status: "ne107, event_class",
     Ne107Cause: "ne107_cause, and bit n - 1 of ne107_causes, from 17 up bit n - 17 of ne107_causes_high",
+    AlarmState: "none, what `positioner alarms` prints",
     ValveTestVerdict: "none, what tests on the valve print and keep",
 }
 """The register that serves each."""

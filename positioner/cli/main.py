@@ -31,6 +31,7 @@ COMMANDS = (
     "steps",
     "discriminate",
     "map",
+    "alarms",
     "events",
     "metrics",
     "opcua",

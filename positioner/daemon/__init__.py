@@ -20,5 +20,6 @@ own. They meet only in immutable snapshots that are replaced whole: the cycle wa
     memory, kept_alone            what is known of a valve, kept over restarts; that one daemon keeps it
     keeping                       one thread that keeps, for all valves
     cycle_statistics, health      how punctual it is; how the valve is (NAMUR NE 107)
+    alarms                        who has seen what calls for somebody, by ISA-18.2
     history                       what has happened, written beside the cycle
 """

@@ -30,11 +30,12 @@ from positioner.control.controller import Controller
 from positioner.control.requests import Requests
 from positioner.control.settings import Settings
 from positioner.control.travel.signal_path import SignalPath
+from positioner.daemon.alarms.alarm_list import AlarmList
 from positioner.daemon.cycle import Cycle, run_in_turn
 from positioner.daemon.ending import Endings
 from positioner.daemon.first_look import impossible
 from positioner.daemon.health import Health, HealthKeeper, HealthSettings, StoredHealth, ne107_condition
-from positioner.daemon.health.ne107 import Ne107Condition
+from positioner.daemon.health.ne107 import Ne107Condition, classes_of
 from positioner.daemon.history import HistoryKeeper, ValveHistory
 from positioner.daemon.history.decision_events import Happened
 from positioner.daemon.history.health_hours import HealthLook
@@ -75,6 +76,7 @@ class ServedValve:
     """Why its device could not be reached at the start; the cycle goes on asking."""
     locked: Callable[[], bool]
     """Whether the local switch locks out."""
+    alarms: AlarmList
 
     @property
     def name(self) -> str:
@@ -95,6 +97,7 @@ class ServedValve:
             requests,
             self.locked,
             SignalPath.of(self.file.travel),
+            self.alarms,
         )
 
     def leave(self) -> None:
@@ -201,22 +204,26 @@ def _assembled(
         if file.health.folder is None
         else StoredHealth.in_folder(source.parent / file.health.folder, file.valve.name, pressure_scales(file))
     )
-    health = Health(
-        HealthSettings.of(file.health, file.valve.stroke_m, file.supervision), stored.kept.record if stored else None
-    )
+    health = Health(HealthSettings.of_file(file), stored.kept.record if stored else None)
     with logging_valve(file.valve.name):
         happened = history.valve(file, health.settings.fault_classes)
         cycle = Cycle(link, controller, pace, _first_requests(file), recorder, file.valve.name, health, happened)
     happened.look = partial(_look, cycle, health)
     locked = happened.locked = locks_out(file.supervisory.local_switch)
+    alarms = AlarmList(
+        lambda kind, status, cause: happened.happened(Happened(kind, status, cause)),
+        lambda cause: classes_of(health)[cause],
+    )
     keepers: list[HealthKeeper | MemoryKeeper] = [
         HealthKeeper(
-            health, lambda: cycle.snapshot.decision, file.valve.name, stored, partial(_tell_of_health, happened)
+            health, lambda: cycle.snapshot, file.valve.name, stored, partial(_tell_of_health, happened), alarms
         )
     ]
     if memory is not None:
         keepers.append(_memory_keeper(memory, file.valve.name, controller, cycle))
-    return ServedValve(file, settings, link, controller, cycle, recorder, tuple(keepers), unreachable_reason, locked)
+    return ServedValve(
+        file, settings, link, controller, cycle, recorder, tuple(keepers), unreachable_reason, locked, alarms
+    )
 
 
 def _memory(file: DaemonFile, extended: ExtendedValve | None, source: Path) -> StoredMemory | None:

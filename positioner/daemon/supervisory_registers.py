@@ -20,8 +20,10 @@ from importlib.metadata import version
 
 from pymodbus.constants import ExcCodes
 
+from config.alarm_table import AlarmsTable
 from config.codes import Fault, Mode, ServiceState
 from config.registers import (
+    ALARMS,
     BY_NAME,
     ESTIMATED,
     EXPERIMENT,
@@ -41,6 +43,8 @@ from fieldbus.modbus.request_counts import RequestCounts
 from positioner.control.controller_memory import Decision
 from positioner.control.requests import Requests
 from positioner.control.travel.signal_path import SignalPath
+from positioner.daemon.alarms.alarm_list import AlarmList
+from positioner.daemon.alarms.alarm_registers import alarm_getters, obey, require_alarm
 from positioner.daemon.backoff import LinesPerPeer
 from positioner.daemon.cycle import Cycle
 from positioner.daemon.cycle_statistics import CycleStatistics
@@ -78,16 +82,19 @@ class SupervisoryRegisters:
         requests: RequestCounts | None = None,
         locked: Callable[[], bool] = lambda: False,
         path: SignalPath | None = None,
+        alarms: AlarmList | None = None,
     ) -> None:
         self._cycle = cycle
         self._valve = valve
         self._travel = travel
         self._path = path or SignalPath()
+        self._alarms = alarms or AlarmList()
         self._minimum_pa = minimum_pa
         self._maximum_pa = maximum_pa
         self._heartbeat = 0
         self._lines = LinesPerPeer()
         self._values = _getters(cycle, travel, self._path) | {"service": lambda s, _: state(s.decision)}
+        self._values |= alarm_getters(self._alarms)
         self._values |= site_getters(requests or RequestCounts(), locked)
         self._locked = locked
 
@@ -118,7 +125,9 @@ class SupervisoryRegisters:
             try:
                 values = self._decoded(address, words)
                 require_let_in(values, self._locked)
+                require_alarm(values, self._longest_shelved_s)
                 self._cycle.requests = self._requested(values)
+                obey(values, self._alarms)
             except WriteRejected as rejected:
                 self._say(logging.WARNING, "write refused", peer, address=address, reason=rejected.reason)
                 if self._cycle.history is not None:
@@ -128,6 +137,11 @@ class SupervisoryRegisters:
             self._say(level, "write", peer, **values)
             if self._cycle.history is not None:
                 self._cycle.history.wrote(peer, values)
+
+    @property
+    def _longest_shelved_s(self) -> float:
+        health = self._cycle.health
+        return AlarmsTable().shelve_limit_s if health is None else health.settings.alarms.shelve_limit_s
 
     def _say(self, level: int, event: str, peer: str, **fields: object) -> None:
         """Log what a peer did; of much, some, with how many lines of its host were passed over before."""
@@ -257,7 +271,13 @@ def _getters(cycle: Cycle, travel: Travel, path: SignalPath) -> dict[str, Getter
         **experiment_getters(),
         **event_getters(cycle),
     }
-    of_others = {"heartbeat", "service", "locked_out", *(f"requests_{each}" for each in REQUESTERS)}
+    of_others = {
+        "heartbeat",
+        "service",
+        "locked_out",
+        *(each.name for each in ALARMS),
+        *(f"requests_{each}" for each in REQUESTERS),
+    }
     assert getters.keys() == BY_NAME.keys() - of_others, getters.keys() ^ BY_NAME.keys()
     return getters
 

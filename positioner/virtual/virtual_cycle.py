@@ -55,7 +55,7 @@ def lockstep_cycle(
     pace = DevicePace()
     link = Link(driver, pace, LinkSettings(travel=daemon.valve.travel))
     held_pa, _ = link.open()
-    health = Health(HealthSettings.of(daemon.health, daemon.valve.stroke_m))
+    health = Health(HealthSettings.of_file(daemon))
     controller = Controller(settings or Settings.of(daemon), held_pa, InProcessRefiner(), restored)
     return Cycle(link, controller, pace, requests, recorder=None, health=health)
 

@@ -6,6 +6,9 @@ counts over restarts.
     valve_health                            all of it, cycle by cycle
     travel_accumulator, stiction_index      how far and how often the stem went; how often it did not
     ne107                                   status and causes
+    valve_conditions                        what is looked at once a second: limits, tests that are due, another spring
+    packing_tests, e_detector               friction and stiction, by tests that keep a promise about false alarms
+    position_limits                         limits of the opening, with dead band and delay
     health_keeper, health_file              logs the status, stores the counts
 """
 

@@ -11,7 +11,11 @@ from collections.abc import Mapping
 from dataclasses import asdict, dataclass, fields, replace
 from pathlib import Path
 
+from pydantic import Field, ValidationError
+
+from config.loading import NonNegative, Schema
 from config.whole_file import replace_whole
+from positioner.daemon.health.valve_conditions import CauseName, KeptConditions
 
 VERSION = 1
 WHOLE = frozenset({"reversals", "moves_judged"})
@@ -24,6 +28,7 @@ ALLOWED: Mapping[str, tuple[float, float]] = {
 }
 """Of each count, and of the friction in the drive's own unit: no valve comes so far, and a register can hold it."""
 SCALES = "scales"
+MORE = "more"
 Scales = Mapping[str, str]
 """Of the device's pressures: keys of the configuration and their values."""
 
@@ -39,6 +44,25 @@ class HealthRecord:
     baseline_pa: float | None = None
 
 
+class KeptAlarm(Schema):
+    """An alarm as it was left."""
+
+    holds: bool
+    acknowledged: bool
+    since_s: NonNegative
+    shelved_until_s: NonNegative
+
+
+class KeptMore(Schema):
+    """What else is kept."""
+
+    conditions: KeptConditions = KeptConditions()
+    alarms: dict[CauseName, KeptAlarm] = Field(default_factory=dict)
+
+
+NOTHING_MORE = KeptMore()
+
+
 class _Unreadable(Exception):
     pass
 
@@ -51,11 +75,13 @@ class KeptHealth:
         record: of today's scales.
         problem: why what was there cannot be read.
         rescaled: which scale is another than that of the baseline, which was dropped, and what it was.
+        more: what is kept beside the counts.
     """
 
     record: HealthRecord = HealthRecord()
     problem: str | None = None
     rescaled: str | None = None
+    more: KeptMore = NOTHING_MORE
 
 
 def read_record(path: Path, valve: str, scales: Scales) -> KeptHealth:
@@ -69,35 +95,36 @@ def read_record(path: Path, valve: str, scales: Scales) -> KeptHealth:
     except FileNotFoundError:
         return KeptHealth()
     try:
-        record, before = _parsed(text, valve)
+        record, before, more = _parsed(text, valve)
     except _Unreadable as error:
         path.replace(path.with_name(path.name + ".unreadable"))
         return KeptHealth(problem=str(error))
     others = [f"{key} was {before[key]}, is {now}" for key, now in scales.items() if before.get(key, now) != now]
     if record.baseline_pa is None or not others:
-        return KeptHealth(record)
+        return KeptHealth(record, more=more)
     dropped = f"{others[0]}; it was {record.baseline_pa:.7g} Pa"
-    return KeptHealth(replace(record, baseline_pa=None), rescaled=dropped)
+    return KeptHealth(replace(record, baseline_pa=None), rescaled=dropped, more=more)
 
 
-def write_record(path: Path, valve: str, record: HealthRecord, scales: Scales) -> None:
+def write_record(path: Path, valve: str, record: HealthRecord, scales: Scales, more: KeptMore = NOTHING_MORE) -> None:
     """Replace the file whole.
 
     Raises:
         OSError: it cannot be written.
     """
     content = {"version": VERSION, "valve": valve, **asdict(record), SCALES: dict(scales)}
+    content[MORE] = more.model_dump(mode="json")
     replace_whole(path, json.dumps(content, allow_nan=False) + "\n")
 
 
-def _parsed(text: bytes, valve: str) -> tuple[HealthRecord, Scales]:
+def _parsed(text: bytes, valve: str) -> tuple[HealthRecord, Scales, KeptMore]:
     try:
         content = json.loads(text)
     except (ValueError, RecursionError) as error:
         raise _Unreadable(f"is not JSON: {str(error).partition(';')[0]}") from None
     names = {field.name for field in fields(HealthRecord)}
-    if not isinstance(content, dict) or content.keys() - {SCALES} != names | {"version", "valve"}:
-        raise _Unreadable(f"must hold version, valve, {', '.join(sorted(names))}, {SCALES} and nothing else")
+    if not isinstance(content, dict) or content.keys() - {SCALES, MORE} != names | {"version", "valve"}:
+        raise _Unreadable(f"must hold version, valve, {', '.join(sorted(names))}, {SCALES}, {MORE} and nothing else")
     for key, allowed in (("version", VERSION), ("valve", valve)):
         if content[key] != allowed:
             raise _Unreadable(f"{key}: allowed is {allowed!r}, got {content[key]!r}")
@@ -107,7 +134,12 @@ def _parsed(text: bytes, valve: str) -> tuple[HealthRecord, Scales]:
     scales = content.get(SCALES, {})  # kept since the second form of the file only
     if not isinstance(scales, dict) or not all(isinstance(each, str) for each in scales.values()):
         raise _Unreadable(f"{SCALES}: must be a table of texts, got {scales!r}")
-    return HealthRecord(**{name: content[name] for name in names}), scales
+    try:
+        more = KeptMore.model_validate(content.get(MORE, {}))  # kept since the third form of the file only
+    except ValidationError as error:
+        first = error.errors()[0]
+        raise _Unreadable(f"{MORE}.{'.'.join(map(str, first['loc']))}: {first['msg']}") from None
+    return HealthRecord(**{name: content[name] for name in names}), scales, more
 
 
 def _problem(name: str, value: object) -> str | None:

@@ -1,22 +1,33 @@
 """Keeps a valve's health beside the cycle: logs when its status changes, and keeps its counts.
 
-The counts are written a minute after the last time, at once when the baseline changed, and at the end: a crash costs a
-minute of them at the most.
+The counts are written a minute after the last time, at once when the baseline or an alarm changed, and at the end: a
+crash costs a minute of them at the most.
 """
 
 import logging
+import time
 from collections.abc import Callable
 from dataclasses import dataclass
 from pathlib import Path
 from urllib.parse import quote
 
-from config.codes import Ne107Status
+from config.codes import Ne107Cause, Ne107Status
 from config.errors import InputError
-from positioner.control.controller_memory import Decision
-from positioner.daemon.health.health_file import HealthRecord, KeptHealth, Scales, read_record, write_record
+from positioner.daemon.alarms.alarm_list import AlarmList
+from positioner.daemon.alarms.alarm_states import Alarm
+from positioner.daemon.health.health_file import (
+    HealthRecord,
+    KeptAlarm,
+    KeptHealth,
+    KeptMore,
+    Scales,
+    read_record,
+    write_record,
+)
 from positioner.daemon.health.ne107 import Ne107Condition, ne107_condition
 from positioner.daemon.health.valve_health import Health
 from positioner.daemon.logs import log_event, logging_valve
+from positioner.daemon.snapshot import Snapshot
 
 log = logging.getLogger(__name__)
 
@@ -60,17 +71,24 @@ class HealthKeeper:
     def __init__(
         self,
         health: Health,
-        decided: Callable[[], Decision],
+        seen: Callable[[], Snapshot],
         valve: str,
         stored: StoredHealth | None,
         tell: Callable[[Ne107Condition], None] = lambda _: None,
+        alarms: AlarmList | None = None,
     ) -> None:
         self._health = health
-        self._decided = decided
+        self._seen = seen
+        self._alarms = alarms or AlarmList()
+        if stored is not None:
+            health.watch.begin(stored.kept.more.conditions)
+            self._alarms.begin(
+                {Ne107Cause[name]: Alarm(**dict(each)) for name, each in stored.kept.more.alarms.items()}
+            )
         self._valve = valve
         self._file = stored
         self._tell = tell
-        self._written = health.record
+        self._written = (health.record, self._more)
         self._logged = Ne107Condition(())
         self._failed = False
         self._checks = 0
@@ -88,7 +106,10 @@ class HealthKeeper:
 
     def check(self) -> None:
         """Check once: log a new status, and write the counts when it is time."""
-        now = ne107_condition(self._decided(), self._health)
+        seen = self._seen()
+        self._health.look(seen.sample, seen.decision, time.time())
+        now = ne107_condition(seen.decision, self._health)
+        self._alarms.look(now.causes)
         if now != self._logged:
             self._logged = now
             level = logging.INFO if now.status in (Ne107Status.GOOD, Ne107Status.FUNCTION_CHECK) else logging.WARNING
@@ -99,22 +120,35 @@ class HealthKeeper:
             )
         self._checks += 1
         record = self._health.record
-        if self._checks % WRITE_EVERY_CHECKS == 0 or record.baseline_pa != self._written.baseline_pa:
+        if self._checks % WRITE_EVERY_CHECKS == 0 or self._is_urgent(record):
             self.store(record)
+
+    def _is_urgent(self, record: HealthRecord) -> bool:
+        """Whether something has changed that a crash must not lose: the baseline, or an alarm."""
+        before, more = self._written
+        return record.baseline_pa != before.baseline_pa or self._more.alarms != more.alarms
 
     def store(self, record: HealthRecord) -> None:
         """Write a record if it is not the one last written; one line of the log when that fails."""
-        if self._file is None or record == self._written:
+        more = self._more
+        if self._file is None or (record, more) == self._written:
             return
         try:
-            write_record(self._file.path, self._valve, record, self._file.scales)
+            write_record(self._file.path, self._valve, record, self._file.scales, more)
         except OSError as error:
             if not self._failed:
                 fields = {"file": str(self._file.path), "reason": error.strerror}
                 log_event(log, logging.ERROR, "health record cannot be written", **fields)
             self._failed = True
             return
-        self._written, self._failed = record, False
+        self._written, self._failed = (record, more), False
+
+    @property
+    def _more(self) -> KeptMore:
+        kept = {
+            cause.name: KeptAlarm(**each._asdict()) for cause, each in self._alarms.alarms.items() if each != Alarm()
+        }
+        return KeptMore(conditions=self._health.watch.kept, alarms=kept)
 
 
 def _say_of(stored: StoredHealth) -> None:

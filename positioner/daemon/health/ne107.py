@@ -32,8 +32,14 @@ CLASS = {
     Ne107Cause.STICTION: Ne107Status.MAINTENANCE_REQUIRED,
     Ne107Cause.TRAVEL: Ne107Status.MAINTENANCE_REQUIRED,
     Ne107Cause.REVERSALS: Ne107Status.MAINTENANCE_REQUIRED,
+    Ne107Cause.HIGH_HIGH: Ne107Status.OUT_OF_SPECIFICATION,
+    Ne107Cause.HIGH: Ne107Status.MAINTENANCE_REQUIRED,
+    Ne107Cause.LOW: Ne107Status.MAINTENANCE_REQUIRED,
+    Ne107Cause.LOW_LOW: Ne107Status.OUT_OF_SPECIFICATION,
+    Ne107Cause.TEST_OVERDUE: Ne107Status.MAINTENANCE_REQUIRED,
+    Ne107Cause.MODEL_CHANGED: Ne107Status.MAINTENANCE_REQUIRED,
 }
-"""The class of each cause, worst first; of faults the daemon's file may say another, of those below it alone does."""
+"""The class of each cause, unless the daemon's file says another; of those below it alone does."""
 FaultClasses = Mapping[Fault, Ne107Status]
 """As table `[supervision]` of the daemon's file has them."""
 MONITORED = {
@@ -51,9 +57,6 @@ that is farther away than `[health] dead_band`."""
 MISSED = 0.06
 """Of the stroke: a stem that stands still farther from its reference is never good, whatever the law says of it. The
 seed's law alone leaves 5.3 % of small moves, (F_s - F_c)/k_s of the seed's valve."""
-
-FEWEST_MOVES = 5
-"""Moves judged before the stiction index counts."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -94,16 +97,22 @@ def ne107_condition(decision: Decision, health: Health) -> Ne107Condition:
         Ne107Cause.PRESSURE_ELSEWHERE: decision.inhibit_reason is InhibitReason.PRESSURE_ELSEWHERE,
         Ne107Cause.ONE_DIRECTION: decision.one_direction,
     }
-    of_faults = health.settings.fault_classes
-    classes = {
-        **CLASS,
-        Ne107Cause.FAULT: class_of(decision.fault, of_faults),
-        Ne107Cause.DCS_SILENT: class_of(Fault.DCS_SILENT, of_faults),
-        **{cause: class_of(fault, of_faults) for fault, cause in MONITORED.items()},
-    }
-    holding = {cause for cause, now in holds.items() if now} | set(_wear(health)) | monitored
+    classes = classes_of(health, decision.fault)
+    holding = {cause for cause, now in holds.items() if now} | set(_wear(health)) | monitored | health.conditions
     causes = sorted(holding, key=lambda cause: (-classes[cause], cause))
     return Ne107Condition(tuple(causes), classes[causes[0]] if causes else Ne107Status.GOOD)
+
+
+def classes_of(health: Health, fault: Fault = Fault.NONE) -> Mapping[Ne107Cause, Ne107Status]:
+    """Return the class of each cause; that of a fault is the one in force."""
+    of_faults = health.settings.fault_classes
+    return {
+        **CLASS,
+        **health.settings.cause_classes,
+        Ne107Cause.FAULT: class_of(fault, of_faults),
+        Ne107Cause.DCS_SILENT: class_of(Fault.DCS_SILENT, of_faults),
+        **{cause: class_of(each, of_faults) for each, cause in MONITORED.items()},
+    }
 
 
 def class_of(fault: Fault, classes: FaultClasses) -> Ne107Status:
@@ -112,14 +121,8 @@ def class_of(fault: Fault, classes: FaultClasses) -> Ne107Status:
 
 
 def _wear(health: Health) -> Iterator[Ne107Cause]:
-    """Yield what calls for maintenance. No comparison holds of the NaN that stands for a ratio not known yet."""
-    settings, record, ratio = health.settings, health.record, health.friction_ratio
-    if 0 < settings.friction_high < ratio:
-        yield Ne107Cause.FRICTION_HIGH
-    if ratio < settings.friction_low:
-        yield Ne107Cause.FRICTION_LOW
-    if record.moves_judged >= FEWEST_MOVES and 0 < settings.stiction_limit < record.stiction_index:
-        yield Ne107Cause.STICTION
+    """Yield which counts have come to their limits."""
+    settings, record = health.settings, health.record
     if 0 < settings.travel_limit_m < record.travel_m:
         yield Ne107Cause.TRAVEL
     if 0 < settings.reversal_limit < record.reversals:

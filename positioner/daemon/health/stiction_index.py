@@ -25,6 +25,8 @@ class StictionIndex:
     def __init__(self, settle_s: float, band_m: Callable[[], float]) -> None:
         self.index = 0.0
         self.judged = 0
+        self.counted = (0, 0)
+        """Moves judged, and missed, since the start; replaced whole."""
         self._settle_s = settle_s
         self._band_m = band_m
         self._reference_m = nan
@@ -55,4 +57,5 @@ class StictionIndex:
         if abs(asked_m) > self._band_m():
             self.judged += 1
             stuck = went_m / asked_m < MADE
+            self.counted = (self.counted[0] + 1, self.counted[1] + stuck)
             self.index += (stuck - self.index) / min(self.judged, MEMORY)

@@ -12,19 +12,24 @@ from collections.abc import Mapping
 from dataclasses import dataclass
 from math import inf, isfinite, nan
 
-from config.codes import Fault, Mode, Ne107Status, Quality, State
-from config.daemon_file import HealthTable
+from config.alarm_table import CLASSED, AlarmsTable
+from config.codes import Fault, Mode, Ne107Cause, Ne107Status, Quality, State
+from config.daemon_file import DaemonFile, HealthTable
 from config.supervision_table import Ne107Letter, SupervisionTable
+from config.travel import Travel
 from positioner.control.controller_memory import Decision
 from positioner.control.requests import Requests
 from positioner.control.sample import Sample
 from positioner.control.travel.cutoffs import WITHIN, sent_to_m
 from positioner.daemon.health.health_file import HealthRecord
+from positioner.daemon.health.packing_tests import FoundFriction, PackingLimits
 from positioner.daemon.health.stiction_index import StictionIndex
 from positioner.daemon.health.travel_accumulator import TravelAccumulator
+from positioner.daemon.health.valve_conditions import PackingFigures, ValveConditions
 from positioner.estimation.acceptance import Applied
 
 MONITORS = SupervisionTable()
+ALARMS = AlarmsTable()
 
 
 @dataclass(frozen=True, slots=True)
@@ -41,10 +46,26 @@ class HealthSettings:
     reversal_limit: int
     fault_classes: Mapping[Fault, Ne107Status]
     """Of what table `[supervision]` names; any other fault is a failure."""
+    cause_classes: Mapping[Ne107Cause, Ne107Status]
+    """Of what table `[alarms]` names."""
+    alarms: AlarmsTable
+    travel: Travel
 
     @classmethod
-    def of(cls, health: HealthTable, stroke_m: float, supervision: SupervisionTable = MONITORS) -> "HealthSettings":
-        """Return the settings that tables `[health]` and `[supervision]` ask for, for a valve of that stroke."""
+    def of_file(cls, file: DaemonFile) -> "HealthSettings":
+        """Return the settings that a daemon's file asks for."""
+        return cls.of(file.health, file.valve.stroke_m, file.supervision, file.alarms, file.valve.travel)
+
+    @classmethod
+    def of(
+        cls,
+        health: HealthTable,
+        stroke_m: float,
+        supervision: SupervisionTable = MONITORS,
+        alarms: AlarmsTable = ALARMS,
+        travel: Travel | None = None,
+    ) -> "HealthSettings":
+        """Return the settings that these tables ask for, for a valve of that stroke."""
         return cls(
             stroke_m=stroke_m,
             dead_band_m=health.dead_band * stroke_m,
@@ -66,6 +87,19 @@ class HealthSettings:
                 Fault.OVERRUN: _class(supervision.overrun.ne107),
                 Fault.COMMAND_RATE: _class(supervision.command_rate.ne107),
             },
+            cause_classes={CLASSED[name]: _class(letter) for name, letter in alarms.ne107.items()},
+            alarms=alarms,
+            travel=travel or Travel(stroke_m),
+        )
+
+    @property
+    def packing(self) -> PackingLimits:
+        """The limits of friction and stiction."""
+        return PackingLimits(
+            friction_high=self.friction_high,
+            friction_low=self.friction_low,
+            stiction_limit=self.stiction_limit,
+            false_alarm_years=self.alarms.false_alarm_years,
         )
 
 
@@ -93,6 +127,10 @@ class Health:
         """From stem to where it is sent, m; 0 where nobody asks, and on its way onto a stop, ..."""
         self.left_away_m = 0.0
         """... and the same where it has stood still for the time in which moves settle: it is not on its way."""
+        self.conditions: frozenset[Ne107Cause] = frozenset()
+        """What holds of what is looked at once a second; replaced whole by the thread that does."""
+        self.watch = ValveConditions(settings.packing, settings.alarms, settings.travel)
+        self._found: FoundFriction | None = None
         self._stood = (nan, nan, inf)
         """Where, for which reference, and since when: m, m, s."""
 
@@ -126,7 +164,7 @@ class Health:
     def enter(self, sample: Sample, decision: Decision, requests: Requests) -> None:
         """Take one cycle."""
         if decision.applied is not self._applied:
-            self._take(decision.applied)
+            self._take(decision)
         if requests is not self._requests:
             self._obey(requests)
         if sample.quality is not Quality.GOOD or not isfinite(sample.position_m):
@@ -150,13 +188,22 @@ class Health:
             self._stood, since_s = (sample.position_m, reference_m, sample.now_s), sample.now_s
         return sample.now_s - since_s >= self.settings.settle_s
 
-    def _take(self, applied: Applied) -> None:
-        self._applied = applied
+    def look(self, sample: Sample, decision: Decision, wall_s: float) -> None:
+        """Look once a second at what needs no cycle; `wall_s` is the time of day, s since 1970."""
+        stiction = self._stiction
+        packing = PackingFigures(self._found, self._baseline_pa, stiction.counted, stiction.index)
+        self.conditions = self.watch.look(sample, decision, packing, wall_s)
+
+    def _take(self, decision: Decision) -> None:
+        before, self._applied = self._applied, decision.applied
+        applied = decision.applied
         if applied.ratios is None:
             return
         self._friction_pa = -applied.ratios.k_over_c
         if applied.count and not applied.ratios.directions.unseen and not isfinite(self._baseline_pa):
             self._baseline_pa = self._friction_pa
+        elif applied.count and (before is None or applied.count != before.count):
+            self._found = FoundFriction(self._friction_pa, decision.estimates.k_over_c.std)
 
     def _obey(self, requests: Requests) -> None:
         before, self._requests = self._requests, requests

@@ -8,10 +8,10 @@ from pathlib import Path
 import pytest
 
 from config.errors import InputError
-from positioner.control.controller_memory import Decision
 from positioner.daemon.health import Health, HealthKeeper, HealthRecord, StoredHealth
 from positioner.daemon.health.health_file import KeptHealth, read_record, write_record
 from positioner.daemon.health.health_keeper import health_path
+from positioner.daemon.snapshot import Snapshot
 
 KEPT = HealthRecord(12.5, 340, 0.25, 17, 22e3)
 SCALES = {"device.map.command_pa.scale": "20.0", "device.map.command_pa.offset": "0.0"}
@@ -119,7 +119,7 @@ def test_a_folder_that_cannot_be_is_one_line(tmp_path: Path) -> None:
         StoredHealth.in_folder(tmp_path / "file", "FV-1", SCALES)
 
 
-def undecided() -> Decision:
+def undecided() -> Snapshot:
     raise AssertionError("keeping needs no decision")
 
 

@@ -1,0 +1,92 @@
+"""`positioner alarms`: the alarms of a running valve; acknowledges and shelves them."""
+
+import argparse
+from typing import TYPE_CHECKING
+
+from positioner.cli.parts.daemon_address import add_connection, connected
+
+if TYPE_CHECKING:
+    from config.codes import AlarmState, Ne107Cause
+
+HELP = "list a valve's alarms with cause and advice; acknowledge or shelve one"
+EXAMPLE = "positioner alarms --acknowledge friction_high"
+
+BITS = ("alarms_active", "alarms_unacknowledged", "alarms_shelved")
+MINUTE_S = 60.0
+
+
+def add_arguments(parser: argparse.ArgumentParser) -> None:
+    """Declare the command line."""
+    what = parser.add_mutually_exclusive_group()
+    what.add_argument("--acknowledge", metavar="ALARM", help="by its name, or `all`")
+    what.add_argument("--shelve", metavar="ALARM", help="put it aside for --minutes")
+    what.add_argument("--unshelve", metavar="ALARM", help="show it again")
+    parser.add_argument("--minutes", type=float, default=60.0, metavar="N", help="for how long it is shelved (60)")
+    parser.add_argument("--json", action="store_true", help="print one JSON object")
+    add_connection(parser)
+
+
+def run(arguments: argparse.Namespace) -> int:
+    """Do what is asked for, then print the alarms; exit status 1 while one is unacknowledged."""
+    import json
+
+    from config.alarm_advice import ADVICE
+    from config.codes import AlarmState
+
+    wanted = {name: _cause(getattr(arguments, name)) for name in ("shelve", "unshelve") if getattr(arguments, name)}
+    if arguments.acknowledge not in (None, "all"):
+        wanted["acknowledge"] = _cause(arguments.acknowledge)
+    for_s = _seconds(arguments.minutes) if "shelve" in wanted else 0.0
+    with connected(arguments) as dcs:
+        for name, cause in wanted.items():
+            written = {"alarm_acknowledge": cause} if name == "acknowledge" else {"alarm_shelve": cause}
+            dcs.set_all({**written, **({} if name == "acknowledge" else {"alarm_shelve_time": for_s})})
+        if arguments.acknowledge == "all":
+            unseen = int(dcs.get("alarms_unacknowledged"))
+            for cause in (each for each in ADVICE if unseen >> (each - 1) & 1):
+                dcs.set("alarm_acknowledge", cause)
+        active, unseen, shelved = (int(each) for each in dcs.get_all(*BITS).values())
+    states = {cause: _state(*(bits >> (cause - 1) & 1 for bits in (active, unseen, shelved))) for cause in ADVICE}
+    shown = {cause: state for cause, state in states.items() if state is not AlarmState.NORMAL}
+    if arguments.json:
+        print(json.dumps({each.name.lower(): {"state": it.text, "cause": each.text} for each, it in shown.items()}))
+        return 1 if unseen else 0
+    for cause, state in shown.items():
+        print(f"{cause.name.lower():20} {state.text:36} {cause.text}\n{'':20} {ADVICE[cause]}")
+    if not shown:
+        print("no alarms")
+    return 1 if unseen else 0
+
+
+def _state(holds: int, unseen: int, shelved: int) -> "AlarmState":
+    """Return the state that three bits say."""
+    from config.codes import AlarmState
+
+    if shelved:
+        return AlarmState.SHELVED
+    if holds:
+        return AlarmState.UNACKNOWLEDGED if unseen else AlarmState.ACKNOWLEDGED
+    return AlarmState.RETURNED if unseen else AlarmState.NORMAL
+
+
+def _cause(name: str) -> "Ne107Cause":
+    """Return the cause of an alarm's name.
+
+    Raises:
+        InputError: there is none; names those there are.
+    """
+    from config.alarm_advice import ADVICE
+    from config.errors import InputError
+
+    for each in ADVICE:
+        if each.name.lower() == name:
+            return each
+    raise InputError(name, f"no alarm of that name; allowed: {', '.join(each.name.lower() for each in ADVICE)}")
+
+
+def _seconds(minutes: float) -> float:
+    from config.errors import InputError
+
+    if not 0.0 < minutes < 1e5:
+        raise InputError("--minutes", f"must be more than 0 and less than 100000, got {minutes:g}")
+    return MINUTE_S * minutes
