@@ -40,7 +40,8 @@ def friction(days: int, rng: np.random.Generator) -> np.ndarray:
         coloured[i] = now
     hour = rng.uniform(0, 1, days)
     cycles = 0.1 * np.sin(2 * np.pi * hour) + 0.1 * np.sin(2 * np.pi * day / YEAR)
-    return np.minimum(1.25 + cycles + coloured + 0.02 * (day % YEAR) / YEAR, WITHIN)
+    within: np.ndarray = np.minimum(1.25 + cycles + coloured + 0.02 * (day % YEAR) / YEAR, WITHIN)
+    return within
 
 
 def observed(truth: np.ndarray, rng: np.random.Generator) -> np.ndarray:

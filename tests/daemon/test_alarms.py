@@ -46,7 +46,7 @@ def test_an_alarm_goes_through_the_states_of_isa_18_2_and_each_step_is_journaled
     alarms, told, pass_time = alarm_list()
     state: Callable[[], AlarmState] = lambda: alarms.alarms[HIGH].state  # noqa: E731
     seen = [state()]
-    for step in (
+    steps: tuple[Callable[[], None], ...] = (
         lambda: alarms.look({HIGH}),
         lambda: alarms.acknowledge(HIGH),
         lambda: alarms.look(()),
@@ -59,7 +59,8 @@ def test_an_alarm_goes_through_the_states_of_isa_18_2_and_each_step_is_journaled
         lambda: alarms.look({HIGH}),
         lambda: pass_time(2.0),
         lambda: alarms.look({HIGH}),
-    ):
+    )
+    for step in steps:
         step()
         seen.append(state())
     assert seen == [NORMAL, NEW, SEEN, NORMAL, NEW, RETURNED, NORMAL, NEW, SHELVED, SHELVED, SHELVED, SHELVED, NEW]
