@@ -144,7 +144,10 @@ def test_what_is_unsure_is_raised_by_many_and_over_with_the_next_that_is_well() 
         count += 1
         raised = tests.look(now_s, FoundFriction(1.7 + 0.1 * rng.standard_normal(), 0.1), 1.0, (0, 0), 0.0)
     assert 1 < count < 12
-    assert tests.look(now_s + HOUR_S, FoundFriction(1.0, 0.1), 1.0, (0, 0), 0.0) == set()
+    assert tests.look(now_s + 1.0, None, 1.0, (0, 0), 0.0) == raised
+    assert tests.look(now_s + 2.0, None, 1.7, (0, 0), 0.0) == set(), "a new baseline"
+    assert tests.look(now_s + HOUR_S, FoundFriction(5.0, 0.1), 1.7, (0, 0), 0.0)
+    assert tests.look(now_s + 2.0 * HOUR_S, FoundFriction(1.0, 0.1), 1.7, (0, 0), 0.0) == set()
 
 
 def test_a_stem_that_misses_all_moves_is_told_and_one_that_misses_the_share_allowed_is_not() -> None:

@@ -9,7 +9,7 @@ the first after a start as if an hour had passed.
 """
 
 from dataclasses import dataclass
-from math import inf, isfinite
+from math import inf, isfinite, nan
 from typing import NamedTuple
 
 from config.codes import Ne107Cause
@@ -63,6 +63,7 @@ class PackingTests:
         self._found: FoundFriction | None = None
         self._found_s = self._moves_s = inf
         self._moves = (0, 0)
+        self._baseline_pa = nan
 
     def begin(self, raised: frozenset[Ne107Cause]) -> None:
         """Go on with what was raised before a restart."""
@@ -86,6 +87,11 @@ class PackingTests:
             stiction_index: the share missed of the last.
         """
         self._moves_s = min(self._moves_s, now_s)
+        if isfinite(self._baseline_pa) and baseline_pa != self._baseline_pa:
+            self._raised -= {Ne107Cause.FRICTION_HIGH, Ne107Cause.FRICTION_LOW}
+            self._high.restart()
+            self._low.restart()
+        self._baseline_pa = baseline_pa
         if found is not None and isfinite(baseline_pa):
             self._friction(now_s, found, baseline_pa)
         self._stiction(now_s, moves, stiction_index)

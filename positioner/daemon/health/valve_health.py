@@ -200,15 +200,16 @@ class Health:
         if applied.ratios is None:
             return
         self._friction_pa = -applied.ratios.k_over_c
-        if applied.count and not applied.ratios.directions.unseen and not isfinite(self._baseline_pa):
-            self._baseline_pa = self._friction_pa
+        if not isfinite(self._baseline_pa):
+            if applied.count and not applied.ratios.directions.unseen:
+                self._baseline_pa = self._friction_pa
         elif applied.count and (before is None or applied.count != before.count):
             self._found = FoundFriction(self._friction_pa, decision.estimates.k_over_c.std)
 
     def _obey(self, requests: Requests) -> None:
         before, self._requests = self._requests, requests
         if requests.baseline_writes != before.baseline_writes:
-            self._baseline_pa = self._friction_pa
+            self._baseline_pa, self._found = self._friction_pa, None
         if requests.health_resets != before.health_resets:
             self._reset()
 
