@@ -4,7 +4,7 @@ Without a file it prints the catalogue; with one it puts it between that file's 
 """
 
 import sys
-from collections.abc import Iterator
+from collections.abc import Iterator, Sequence
 from pathlib import Path
 
 from sim.effect import PLACES, Effect, Parameter, shipped_effect, shipped_effects
@@ -21,7 +21,20 @@ def catalogue() -> str:
     along = sorted(effects, key=lambda each: [*PLACES].index(each.places[0]))
     by_place = [(place, [each.name for each in along if each.places[0] == place]) for place in PLACES]
     overview = "\n".join(f"- {place}: {', '.join(f'`{name}`' for name in names)}" for place, names in by_place if names)
-    return "\n\n".join([overview, *("\n\n".join(_section(each)) for each in along)])
+    sections = ["\n\n".join(_section(each)) for each in along]
+    return "\n\n".join([overview, *sections, "### What tells them apart", "\n".join(_apart(along))])
+
+
+def _apart(effects: Sequence[Effect]) -> list[str]:
+    """Return what tells an effect from another, or from a parameter of the bare valve, each pair once."""
+    pairs = {
+        tuple(
+            sorted((effect.name, other))
+        ): f"- `{effect.name}`, `{other}`: {told or 'no record of pressure and position'}"
+        for effect in effects
+        for other, told in effect.confounded.items()
+    }
+    return [pairs[pair] for pair in sorted(pairs)]
 
 
 def renewed(document: str) -> str:
@@ -45,11 +58,6 @@ def _section(effect: Effect) -> Iterator[str]:
     yield f"```\n{effect.equation}\n```"
     yield "\n".join(_line(key, each) for key, each in effect.parameters.items())
     yield f"In a record: {effect.looks}"
-    apart = [
-        f"- `{name}`: {told or 'no record of pressure and position tells them apart'}"
-        for name, told in effect.confounded.items()
-    ]
-    yield "\n".join(["Confounded with:", *apart])
 
 
 def _line(key: str, parameter: Parameter) -> str:

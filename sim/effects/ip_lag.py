@@ -15,8 +15,8 @@ from sim.first_order_lag import lagged
 MEMORY = 1
 STEP_S = 2e-3
 LOOKS = (
-    "After a step of the command the stem starts late and gently, is fastest later and creeps into its end, in the "
-    "same shape whatever the step's height; on a ramp it runs T behind."
+    "After a step of the command the stem starts late and gently, is fastest later and creeps into its end. The shape "
+    "is the same whatever the step's height. On a ramp it runs T behind."
 )
 CONFOUNDED = {
     "dead_time": "the first moments after a step: the lag answers at once, the dead time not at all",

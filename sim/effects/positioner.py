@@ -24,8 +24,8 @@ STEP_S = 0.005
 PRESSURE_PA, INTEGRAL_M, BEFORE_M = 0, 1, 2
 NO_INTEGRAL_S = 1e6
 LOOKS = (
-    "The stem follows its set point: small changes are not answered at all, large ones along a ramp whose slope does "
-    "not depend on their height, and what friction holds back comes late, with a jump, or overshoots."
+    "The stem follows its set point. Small changes are not answered at all, large ones along a ramp whose slope does "
+    "not depend on their height. What friction holds back comes late, with a jump, or overshoots."
 )
 CONFOUNDED = {
     "coulomb_n": "measured actuator pressure: a dead band leaves it still, friction lets it rise; without it, whether "

@@ -32,8 +32,8 @@ LOGARITHMIC = 1e-6
 
 AFTER = "presliding"
 LOOKS = (
-    "Small steps move the stuck stem a little before break-away; brought back to the same pressure it does not come "
-    "back to the same place, and small cycles of the pressure draw loops."
+    "Small steps move the stuck stem a little before break-away. Brought back to the same pressure it does not come "
+    "back to the same place. Small cycles of the pressure draw loops."
 )
 CONFOUNDED = {
     "presliding": "small cycles of the pressure below break-away: a loop only if energy is lost",

@@ -19,8 +19,8 @@ NO_TIME_S = 1e-9
 UNLIMITED = 1e10
 """Pa/s, from which a jump is made at once."""
 LOOKS = (
-    "High steps are answered by a ramp whose slope does not depend on the step's height, and differs between opening "
-    "and closing if filling and venting do; small steps are untouched."
+    "High steps are answered by a ramp whose slope does not depend on the step's height. It differs between opening "
+    "and closing if filling and venting do. Small steps are untouched."
 )
 CONFOUNDED = {
     "asymmetric_viscosity": "measured actuator pressure: the limit lies before it, viscous friction after",

@@ -1,0 +1,62 @@
+"""Counts the sentences of the documents that are longer than 30 words: `python -m docs.long_sentences`.
+
+The count may only fall. `MOST` is what there is; who shortens a sentence lowers it. Without an argument it prints the
+count; with `--list` it prints each sentence with its page.
+"""
+
+import re
+import sys
+from collections.abc import Iterator
+from pathlib import Path
+
+ROOT = Path(__file__).parents[1]
+PAGES = [ROOT / "README.md", ROOT / "CONTRIBUTING.md", *sorted((ROOT / "docs").rglob("*.md"))]
+LONGEST_WORDS = 30
+"""Words of a sentence that is read once; 25 are the aim."""
+MOST = 52
+"""Longer sentences that there are."""
+FENCED = re.compile(r"^```.*?^```", re.MULTILINE | re.DOTALL)
+NO_TEXT = re.compile(r"<!--.*?-->|!\[[^\]]*\]\([^)]*\)", re.DOTALL)
+NO_LINE = re.compile(r" {4}|>>> |\.\.\. |[|\- ]+$")
+"""Code, an example, a rule of a table."""
+LINK = re.compile(r"\[([^\]]*)\]\([^)]*\)")
+CODE = re.compile(r"`[^`]+`")
+BLOCK = re.compile(r"\n\s*\n|\n(?=\s*(?:[-*#|>]|\d+\.) ?)|\|")
+"""Ends a paragraph, an item of a list, a heading, a cell of a table."""
+END = re.compile(r"(?<=[.!?])[*\")]*\s+(?=[A-Z0-9*\"`(])")
+
+
+def sentences(text: str) -> Iterator[str]:
+    """Yield the sentences of a page; code counts as one word, indented blocks and tables' rules are none."""
+    text = NO_TEXT.sub("", FENCED.sub("", text))
+    text = "\n".join("" if NO_LINE.match(line) else line for line in text.splitlines())
+    for block in BLOCK.split(CODE.sub("CODE", LINK.sub(r"\1", text))):
+        yield from END.split(" ".join(block.split()))
+
+
+def long_sentences() -> Iterator[tuple[str, str]]:
+    """Yield page and sentence of each that is too long."""
+    for page in PAGES:
+        for sentence in sentences(page.read_text(encoding="utf-8")):
+            if len(re.findall(r"\w[\w'-]*", sentence)) > LONGEST_WORDS:
+                yield str(page.relative_to(ROOT)), sentence
+
+
+def main() -> int:
+    """Print the count, or the sentences; exit status 1 where there are more than `MOST`, or fewer."""
+    found = list(long_sentences())
+    if "--list" in sys.argv[1:]:
+        for page, sentence in found:
+            print(f"{page}: {sentence}")
+    said = f"{len(found)} sentences of more than {LONGEST_WORDS} words"
+    if len(found) > MOST:
+        print(f"{said}, {MOST} were there: shorten what is new (python -m docs.long_sentences --list)")
+        return 1
+    if len(found) < MOST:
+        print(f"{said}: set MOST in docs/long_sentences.py to {len(found)}, so that it stays")
+        return 1
+    return 0
+
+
+if __name__ == "__main__":
+    sys.exit(main())
