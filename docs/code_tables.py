@@ -30,7 +30,7 @@ TABLES_BEGIN = "<!-- tables: written by `python -m docs.code_tables` -->"
 TABLES_END = "<!-- end of the tables -->"
 HEAD = """# What the numbers say
 
-For who programs a DCS: after this page you can say what each number of a register means. A number never gets a new
+For who programs a DCS. After this page you can say what each number of a register means. A number never gets a new
 meaning. Written by `python -m docs.code_tables` from `config/codes.py`.
 """
 SERVED: dict[type[Code], str] = {code: register for register, code in CODES.items()} | {

@@ -383,11 +383,13 @@ def shown_step(label: str, now: dict[str, float]) -> str:
 
 
 def _bar(now: dict[str, float], width: int = 20) -> str:
-    """Draw stem (#) and reference (|) over the travel."""
-    stem = round(min(max(now["position"], 0.0), 1.0) * width)
+    """Draw stem (#) and reference (|) over the travel; a stem that nobody measures is none."""
+    position, reference = now["position"], now["reference_in_force"]
+    stem = round(min(max(position, 0.0), 1.0) * width) if math.isfinite(position) else 0
     cells = ["#"] * stem + ["."] * (width - stem)
-    cells[min(round(now["reference_in_force"] * width), width - 1)] = "|"
-    return f"[{''.join(cells)}] {now['position']:z.3f}"
+    if math.isfinite(reference):
+        cells[min(round(reference * width), width - 1)] = "|"
+    return f"[{''.join(cells)}] {position:z.3f}"
 
 
 def _show_passing(text: str) -> None:

@@ -1,6 +1,7 @@
 """Progress: one moving line on a terminal, few lines in a log."""
 
 import io
+import math
 import os
 import threading
 
@@ -48,6 +49,11 @@ def test_a_line_that_passes_is_no_longer_than_the_terminal_is_wide(
 def test_what_the_demo_shows_of_a_step_has_room_in_eighty_columns() -> None:
     assert len(step_shown()) < 80
     assert step_shown().endswith("] 0.000 S3 100.0 kPa")
+
+
+def test_a_stem_that_nobody_measures_is_shown_as_none() -> None:
+    now = {"position": math.nan, "reference_in_force": math.nan, "state": 0.0, "command": 0.0}
+    assert shown_step("S0", now).endswith(f"[{'.' * 20}] nan S0   0.0 kPa")
 
 
 def step_shown() -> str:
