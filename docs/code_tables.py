@@ -63,7 +63,7 @@ def renewed(document: str) -> str:
 
 
 def _causes(status: Ne107Status) -> str:
-    return ", ".join(f"{int(cause)} {cause.text}" for cause, own in CLASS.items() if own is status)
+    return "<br>".join(f"{int(cause)} {cause.text}" for cause, own in CLASS.items() if own is status)
 
 
 def with_states(document: str) -> str:

@@ -13,7 +13,7 @@ ROOT = Path(__file__).parents[1]
 PAGES = [ROOT / "README.md", ROOT / "CONTRIBUTING.md", *sorted((ROOT / "docs").rglob("*.md"))]
 LONGEST_WORDS = 30
 """Words of a sentence that is read once; 25 are the aim."""
-MOST = 52
+MOST = 51
 """Longer sentences that there are."""
 FENCED = re.compile(r"^```.*?^```", re.MULTILINE | re.DOTALL)
 NO_TEXT = re.compile(r"<!--.*?-->|!\[[^\]]*\]\([^)]*\)", re.DOTALL)
@@ -21,7 +21,7 @@ NO_LINE = re.compile(r" {4}|>>> |\.\.\. |[|\- ]+$")
 """Code, an example, a rule of a table."""
 LINK = re.compile(r"\[([^\]]*)\]\([^)]*\)")
 CODE = re.compile(r"`[^`]+`")
-BLOCK = re.compile(r"\n\s*\n|\n(?=\s*(?:[-*#|>]|\d+\.) ?)|\|")
+BLOCK = re.compile(r"\n\s*\n|\n(?=\s*(?:[-*#|>]|\d+\.) ?)|\||<br>")
 """Ends a paragraph, an item of a list, a heading, a cell of a table."""
 END = re.compile(r"(?<=[.!?])[*\")]*\s+(?=[A-Z0-9*\"`(])")
 
@@ -43,7 +43,7 @@ def long_sentences() -> Iterator[tuple[str, str]]:
 
 
 def main() -> int:
-    """Print the count, or the sentences; exit status 1 where there are more than `MOST`, or fewer."""
+    """Print the count, or the sentences; exit status 1 where there are more than `MOST`."""
     found = list(long_sentences())
     if "--list" in sys.argv[1:]:
         for page, sentence in found:
@@ -54,7 +54,6 @@ def main() -> int:
         return 1
     if len(found) < MOST:
         print(f"{said}: set MOST in docs/long_sentences.py to {len(found)}, so that it stays")
-        return 1
     return 0
 
 

@@ -35,4 +35,4 @@ no. Sentence.
 
 
 def test_there_are_no_more_long_ones_than_there_were() -> None:
-    assert len(list(long_sentences())) == MOST, "python -m docs.long_sentences --list; a shorter list lowers MOST"
+    assert len(list(long_sentences())) <= MOST, "python -m docs.long_sentences --list"
