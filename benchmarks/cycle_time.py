@@ -5,11 +5,10 @@ slave is a process of its own in lockstep; the ways take turns cycle by cycle, s
 each begins, as in real time, with the caches of others' work. Half of the time the daemon identifies.
 """
 
-import itertools
 import statistics
 import tempfile
 import time
-from collections.abc import Callable, Iterator
+from collections.abc import Callable, Iterator, Sequence
 from dataclasses import replace
 from pathlib import Path
 
@@ -39,7 +38,7 @@ DAEMON = DaemonFile.model_validate(
     {"valve": {"stroke_m": STROKE_M}, "cycle": {"pace": "device"}, "control": {"law": "seed"}}
 )
 FIRST = Requests(mode=Mode.AUTOMATIC, mode_writes=1, alpha_pa=44e3, beta_pa=13e3)
-TURN_S = 1.0
+TURN_S, RUN_S = 1.0, 8.0
 TARGET_RATIO, TARGET_US = 0.8, 40.0
 
 
@@ -114,6 +113,22 @@ def full_loop(cycle: Cycle) -> Callable[[], object]:
 
 def core_alone() -> Iterator[float]:
     """Yield the time of each step of the control core on the samples of a virtual run, us."""
+    controller = Controller(Settings.of(DAEMON), 0.0)
+    for sample, requests in virtual_run():
+        start_ns = time.perf_counter_ns()
+        controller.step(sample, requests)
+        yield (time.perf_counter_ns() - start_ns) / 1e3
+
+
+def core_again(inputs: Sequence[tuple[Sample, Requests]]) -> None:
+    """Let a control core that knows nothing yet decide on all samples of a virtual run."""
+    controller = Controller(Settings.of(DAEMON), 0.0)
+    for sample, requests in inputs:
+        controller.step(sample, requests)
+
+
+def virtual_run() -> list[tuple[Sample, Requests]]:
+    """Run the daemon's cycle on a device in memory for `RUN_S`; return what its control core was given."""
     file = SlaveFile.model_validate({"clock": {"mode": "lockstep"}, "sensor": {"noise_std_m": 1e-5}})
     cycle = virtual_cycle(DAEMON, device_of(file, shipped_valve("seed")), FIRST)
     script = busy_dcs()
@@ -123,13 +138,9 @@ def core_alone() -> Iterator[float]:
         seen.append((snapshot.sample, requests))
         return script(snapshot, requests)
 
-    for _ in itertools.islice(played(cycle, noting, 8 * TURN_S), None):
+    for _ in played(cycle, noting, RUN_S):
         pass
-    controller = Controller(Settings.of(DAEMON), 0.0)
-    for sample, requests in seen:
-        start_ns = time.perf_counter_ns()
-        controller.step(sample, requests)
-        yield (time.perf_counter_ns() - start_ns) / 1e3
+    return seen
 
 
 if __name__ == "__main__":

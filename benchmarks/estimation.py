@@ -14,7 +14,7 @@ from positioner.estimation import Estimates, Identification, IdentificationSetti
 from positioner.estimation.algebraic import Identifier
 from positioner.estimation.batch import BatchSettings, identify
 from positioner.estimation.online import READINGS
-from positioner.estimation.refiner import InProcessRefiner, RefinementJob
+from positioner.estimation.refiner import InProcessRefiner, Refinement, RefinementJob
 from positioner.estimation.weighted import CHAINS, ROWS, Feeds, kernel
 from positioner.paper import hardships, noise_table
 from sim.valve import Valve
@@ -303,7 +303,8 @@ def _ageing() -> list[str]:
     valve = Valve.from_file(load_valve(shipped_valve("seed")))
     valve.rest_at(0.05)
     pressure_pa, rng = valve.pressure_pa, np.random.default_rng(0)
-    identification = Identification(replace(SETTINGS, noise_std_m=None, pressure_pa=4e5), InProcessRefiner())
+    identification = Identification(replace(SETTINGS, noise_std_m=None, pressure_pa=4e5))
+    refiner = InProcessRefiner()
     identification.restart()
     coulomb_n, static_n, spring, area = (-TRUE[5] * AREA, 1708.09, -TRUE[4] * AREA, AREA)
     errors = []
@@ -320,7 +321,10 @@ def _ageing() -> list[str]:
             valve.advance(pressure_pa, 2e-3)
             measured_m = valve.position_m + float(rng.normal(0, 1e-4 * SETTINGS.stroke_m))
             sample = (20.0 * move + 2e-3 * row, measured_m, valve.pressure_pa)
-            identification.update(*sample, parameters=True, friction=True, passive=True)
+            stands = Refinement.of(refiner)
+            identification.update(*sample, parameters=True, friction=True, passive=True, refinement=stands)
+            if (job := identification.taken_job()) is not None:
+                refiner.submit(job)
         errors.append(abs(identification.estimates.k_over_c.value / (-coulomb_n * grown / area) - 1))
     settled = [each for each in errors[3:] if each == each]  # noqa: PLR0124 - NaN is not itself
     return [

@@ -62,7 +62,11 @@ def _pieces() -> dict[str, Callable[[], object]]:
             f"{name}: stick-slip staircase": _run(valve, partial(valve.run, stairs, 1e-3)),
             f"{name}: 800 calls of 1 ms": _run(valve, partial(_calls, valve, slow.tolist())),
         }
-    return pieces | {"virtual loop of 8 s, and the core again": lambda: sum(cycle_time.core_alone())}
+    inputs = cycle_time.virtual_run()
+    return pieces | {
+        f"daemon's cycle, {cycle_time.RUN_S:g} s in virtual time": cycle_time.virtual_run,
+        f"control core alone, those {len(inputs)} steps": partial(cycle_time.core_again, inputs),
+    }
 
 
 def _calls(valve: Valve, commands_pa: Sequence[float]) -> None:

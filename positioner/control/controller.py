@@ -1,7 +1,9 @@
 """One step of the controller: supervise, follow the reference, identify, choose the state, command.
 
-`step` is a function of the memory, the sample and the requests; what it remembers is in the frozen `Memory` and in
-the running integrals of the identification. It reads no clock.
+    (memory', decision) = step(memory, sample, requests, settings)
+
+`step` is a function of what it is given: it reads no clock and asks nobody. What a refinement has found is given to it,
+too, and what is to be refined is left in the memory for `Controller`, which keeps the memory from step to step.
 """
 
 from dataclasses import replace
@@ -29,13 +31,13 @@ from positioner.control.controller_memory import ConsumedRequests, ControllerMem
 from positioner.control.excitation import NOTHING, ActiveExcitation, climbed, excitation_after
 from positioner.control.identifying import estimates_tested, identify
 from positioner.control.laws.boundary import Law, Seen
-from positioner.control.monitors import Asked, MonitorMemory, after_cycle
+from positioner.control.monitors import MonitorMemory, Needs, after_cycle
 from positioner.control.played_experiment import PlayedExperiment, Surroundings, experiment_after
 from positioner.control.pressure_clamp import clamped
 from positioner.control.pressure_path import PathMemory, long_held
 from positioner.control.reference import Reference
 from positioner.control.requests import Requests
-from positioner.control.rest_band import rest_band
+from positioner.control.rest_band import RestBand, rest_band
 from positioner.control.restoration import Restoration
 from positioner.control.sample import Sample
 from positioner.control.settings import Settings
@@ -49,8 +51,9 @@ from positioner.estimation.acceptance import Applied, Ratios
 from positioner.estimation.landings.landing_detector import SlideOutcome
 from positioner.estimation.landings.static_identification import StaticIdentification
 from positioner.estimation.online import Identification
-from positioner.estimation.refiner import Refiner
+from positioner.estimation.refiner import Refinement, Refiner
 
+NOTHING_FOUND = Refinement()
 FOLLOWING = (S1, S2)
 """The states in which the law commands."""
 
@@ -73,37 +76,13 @@ class Controller:
         restored: ValveKnowledge | None = None,
     ) -> None:
         self._settings = settings
-        self._identification = Identification(settings.identification, refiner)
-        self._statics = StaticIdentification(settings.limits.stroke_m, valve=settings.valve)
-        law = settings.law.begin(held_pa)
-        if restored is not None:
-            law = law.restored(restored)
-            self._statics.restore(restored.landings, restored.held, restored.answers)
-        self._memory = ControllerMemory(
-            command_pa=held_pa,
-            wanted_pa=held_pa,
-            held_pa=held_pa,
-            supervision=SupervisionMemory(),
-            monitoring=MonitorMemory(),
-            reference=Reference(0.0),
-            applied=settings.applied if restored is None else Applied(restored.ratios),
-            consumed=ConsumedRequests(),
-            state=S0,
-            excitation=None,
-            experiment=PlayedExperiment(),
-            identifying=False,
-            law=law,
-            path=long_held(held_pa) if settings.valve is not None and settings.valve.inverse.delays else None,
-            restoration=Restoration.of(restored, settings.valve),
-            cut_off=WITHIN,
-            course=OnCourse.begun(0.0, 0.0),
-            first_landing=0,
-        )
+        self._refiner = refiner
+        self._memory = first_memory(settings, held_pa, restored)
 
     @property
     def command_pa(self) -> float:
         """The last command given."""
-        return self._memory.command_pa
+        return self._memory.last.command_pa
 
     @property
     def left_pa(self) -> float:
@@ -117,23 +96,76 @@ class Controller:
         May be asked by another thread: all it is made of is replaced whole.
         """
         memory = self._memory
-        trust, exciting = memory.restoration.trust, memory.excitation is not None and not memory.excitation.ended
-        followed = memory.applied.count > 0 or (self._settings.valve is not None and bool(self._statics.landings))
+        last, statics, settings = memory.last, memory.statics, self._settings
+        trust, exciting = last.restoration.trust, memory.excitation is not None and not memory.excitation.ended
+        followed = last.applied.count > 0 or (settings.valve is not None and bool(statics.landings))
         found = trust is Restored.CONFIRMED or (followed and trust is not Restored.PROVISIONAL)
         # What is kept says where slides balance; of a stem that swings past that, it would not agree with a landing.
-        if memory.applied.ratios is None or not found or exciting or self._statics.law.swing:
+        if last.applied.ratios is None or not found or exciting or statics.law.swing:
             return None
-        settings, statics, estimates = self._settings, self._statics, self._identification.estimates
-        seen = known(memory.applied.ratios, estimates, statics, settings.limits.stroke_m, settings.valve)
+        estimates, stroke_m = memory.identification.estimates, settings.limits.stroke_m
+        seen = known(last.applied.ratios, estimates, statics, stroke_m, settings.valve)
         return memory.law.known(seen, statics)
 
     def step(self, sample: Sample, requests: Requests) -> Decision:
         """Decide on one sample."""
-        settings = self._settings
-        stem_m = sample.position_m if usable(sample, settings.limits) else None
-        now = Now(self._memory, sample, requests, settings, self._identification, self._statics, stem_m)
-        self._memory, decision = step(now)
+        memory, refiner = self._memory, self._refiner
+        if refiner is None:
+            self._memory, decision = step(memory, sample, requests, self._settings)
+            return decision
+        refinement = Refinement.of(refiner) if memory.identifying else NOTHING_FOUND
+        self._memory, decision = step(memory, sample, requests, self._settings, refinement)
+        if self._memory.identifying and (job := memory.identification.taken_job()) is not None:
+            refiner.submit(job)
         return decision
+
+
+def first_memory(settings: Settings, held_pa: float, restored: ValveKnowledge | None = None) -> ControllerMemory:
+    """Return the memory before the first step, of a device that holds a command, Pa, and of what was known before."""
+    statics = StaticIdentification(settings.limits.stroke_m, valve=settings.valve)
+    identification = Identification(settings.identification)
+    law = settings.law.begin(held_pa)
+    if restored is not None:
+        law = law.restored(restored)
+        statics.restore(restored.landings, restored.held, restored.answers)
+    supervision, reference = SupervisionMemory(), Reference(0.0)
+    nothing_yet = Decision(
+        command_pa=held_pa,
+        state=S0,
+        mode=supervision.mode,
+        fault=supervision.fault,
+        inhibit_reason=InhibitReason.NOT_AUTOMATIC,
+        reference_m=reference.value_m,
+        delta_r_m=reference.delta_m,
+        sample_age_s=0.0,
+        estimates=identification.estimates,
+        applied=settings.applied if restored is None else Applied(restored.ratios),
+        static_law=statics.law,
+        restoration=Restoration.of(restored, settings.valve),
+        experiment=PlayedExperiment(),
+        alarms=(),
+        measured=False,
+        cut_off=WITHIN,
+        dead_band_m=settings.dead_band.fixed_m or 0.0,
+        one_direction=False,
+    )
+    return ControllerMemory(
+        last=nothing_yet,
+        wanted_pa=held_pa,
+        held_pa=held_pa,
+        supervision=supervision,
+        monitoring=MonitorMemory(),
+        reference=reference,
+        consumed=ConsumedRequests(),
+        excitation=None,
+        identifying=False,
+        law=law,
+        path=long_held(held_pa) if settings.valve is not None and settings.valve.inverse.delays else None,
+        course=OnCourse.begun(0.0, 0.0),
+        first_landing=0,
+        identification=identification,
+        statics=statics,
+    )
 
 
 class Now(NamedTuple):
@@ -143,52 +175,72 @@ class Now(NamedTuple):
     sample: Sample
     requests: Requests
     settings: Settings
-    identification: Identification
-    statics: StaticIdentification
     stem_m: float | None
     """Measured position of the stem, m; None without a good measurement."""
 
 
-def step(now: Now) -> tuple[ControllerMemory, Decision]:
-    """Return what is remembered and what is decided after one sample."""
-    sample, settings = now.sample, now.settings
+def step(
+    memory: ControllerMemory,
+    sample: Sample,
+    requests: Requests,
+    settings: Settings,
+    refinement: Refinement | None = None,
+) -> tuple[ControllerMemory, Decision]:
+    """Return what is remembered and what is decided after one sample.
+
+    Args:
+        memory: after the step before; its running integrals go on in the one that is returned (`copied`).
+        sample: the latest.
+        requests: of the DCS.
+        settings: of the valve.
+        refinement: of identifications, as it stands; None where nobody refines.
+    """
+    now = Now(memory, sample, requests, settings, sample.position_m if usable(sample, settings.limits) else None)
     monitoring, supervision = _supervised(now)
+    mode = supervision.mode
     consumed = _consumed(now, supervision)
-    waits = _waits(now, supervision.mode)
-    reference, course = _reference(now, supervision.mode, consumed, waits=waits)
+    waits = memory.last.restoration.provisional and _waits(now, mode)
+    reference, course = _reference(now, mode, consumed, waits=waits)
     experiment = _experiment(now, supervision)
+    playing = experiment.commands
     excitation, excitation_inhibit, outcome = _excited(now, supervision, reference)
+    exciting = excitation is not None and not excitation.ended
     identifying, found = identify(
-        now.memory,
+        memory,
         excitation,
         sample,
-        now.stem_m is not None,
-        now.requests,
-        now.identification,
-        now.statics,
+        requests,
+        refinement,
+        fresh=now.stem_m is not None,
         by_slides=settings.staircase is not None,
     )
-    memory, applied, restoration = _confirmed(now, found, outcome, excitation, experiment, supervision.mode)
-    now = now._replace(memory=memory)
+    restoration = _restoration(now, found, None if exciting or playing else outcome, mode)
+    dropped = restoration.trust is Restored.DROPPED and memory.last.restoration.provisional
+    applied, law_before = found, memory.law
+    if dropped:
+        applied, law_before = _nothing_known(now, found)
+    elif outcome is not None and outcome.landing and not playing:
+        applied = memory.statics.corrected(found)
     situation = Situation(
-        supervision.mode is AUTOMATIC,
-        experiment.commands or (excitation is not None and not excitation.ended),
-        applied.ratios is not None and not (excitation is not None and excitation.unanswered),
-        reference.delta_m,
-        restoration.trust is Restored.DROPPED,
+        automatic=mode is AUTOMATIC,
+        exciting=playing or exciting,
+        law_ready=applied.ratios is not None and not (excitation is not None and excitation.unanswered),
+        delta_r_m=reference.delta_m,
+        dropped=restoration.trust is Restored.DROPPED,
     )
     state = state_in(situation)
-    held_pa = _held_pa(now, state, supervision)
-    cut_off = settings.cutoffs.after(memory.cut_off, reference.value_m) if state in FOLLOWING else WITHIN
-    follows = state in FOLLOWING and cut_off == WITHIN
+    held_pa = _held_pa(now, state, supervision, law_before)
+    following = state in FOLLOWING
+    cut_off = settings.cutoffs.after(memory.last.cut_off, reference.value_m) if following else WITHIN
+    follows = following and cut_off == WITHIN
     dead_band_m = _dead_band_m(now, applied)
     seen = _seen(now, reference, applied.ratios if follows else None, outcome, dead_band_m)
-    by_steps, law = _law(now, seen)
+    one_direction = _knows_one_direction(settings, applied.ratios)
+    by_steps, law = _law(now, law_before, seen) if follows and one_direction else (0, law_before.observe(seen))
 
     asked_pa = _asked_pa(now, consumed, supervision, held_pa)
     if asked_pa is None:
-        exciting = experiment if experiment.commands else excitation
-        asked_pa = _pressure_pa(now, state, held_pa, exciting, law, cut_off)
+        asked_pa = _pressure_pa(now, state, held_pa, experiment if playing else excitation, law, cut_off)
         if by_steps and applied.ratios is not None:
             asked_pa = _stepped_pa(now, by_steps, applied.ratios, reference)
     commanded = _commanded(now, asked_pa, lead=not supervision.fault and follows)
@@ -197,18 +249,17 @@ def step(now: Now) -> tuple[ControllerMemory, Decision]:
         situation, law = situation._replace(automatic=False), settings.law.begin(held_pa)
         consumed = _consumed(now, supervision)
         commanded = _held_instead(now)
-    wanted_pa, command_pa, path = commanded
 
     by_law = InhibitReason.ONE_DIRECTION if by_steps else law.inhibit_reason
     by_law = InhibitReason.CUT_OFF if cut_off != WITHIN else by_law
     inhibit_reason = (
         excitation_inhibit
-        or (NOTHING if experiment.commands or excitation is None else excitation.waits_for(now.statics))
+        or (NOTHING if playing or excitation is None else excitation.waits_for(memory.statics))
         or (InhibitReason.RESTORED_WAITS if waits else law_inhibit_reason(situation))
         or (by_law if settings.minimum_pa <= asked_pa <= settings.maximum_pa else InhibitReason.LAW_BEYOND_LIMITS)
     )
     decision = Decision(
-        command_pa=command_pa,
+        command_pa=commanded.command_pa,
         state=state,
         mode=supervision.mode,
         fault=supervision.fault,
@@ -216,56 +267,56 @@ def step(now: Now) -> tuple[ControllerMemory, Decision]:
         reference_m=reference.value_m,
         delta_r_m=reference.delta_m,
         sample_age_s=sample.now_s - supervision.good_s,
-        estimates=estimates_tested(excitation, now.identification, now.statics),
+        estimates=estimates_tested(excitation, memory.identification, memory.statics),
         applied=applied,
-        static_law=now.statics.law,
+        static_law=memory.statics.law,
         restoration=restoration,
         experiment=experiment,
         alarms=monitoring.holding,
         measured=supervision.position_m is not None,
         cut_off=cut_off,
         dead_band_m=dead_band_m,
-        one_direction=_knows_one_direction(now, applied.ratios),
+        one_direction=one_direction,
     )
     return ControllerMemory(
-        command_pa=command_pa,
-        wanted_pa=wanted_pa,
+        last=decision,
+        wanted_pa=commanded.wanted_pa,
         held_pa=held_pa,
         supervision=supervision,
         monitoring=monitoring,
         reference=reference,
-        applied=applied,
         consumed=consumed,
-        state=state,
         excitation=excitation,
-        experiment=experiment,
         identifying=identifying,
         law=law,
-        path=path,
-        restoration=restoration,
-        cut_off=cut_off,
+        path=commanded.path,
         course=course,
         first_landing=by_steps,
+        identification=memory.identification,
+        statics=memory.statics,
     ), decision
 
 
 def _supervised(now: Now) -> tuple[MonitorMemory, SupervisionMemory]:
     """Return what the monitors and the supervision know after this sample."""
-    memory, settings = now.memory, now.settings
-    acknowledged = now.requests.acknowledgements != memory.supervision.acknowledgements
+    memory, sample, settings = now.memory, now.sample, now.settings
+    command_pa, before = memory.last.command_pa, memory.supervision
+    acknowledged = now.requests.acknowledgements != before.acknowledgements
     monitoring = after_cycle(
         MonitorMemory() if acknowledged else memory.monitoring,
         settings.monitoring,
-        now.sample.now_s,
-        now.stem_m,
-        memory.command_pa,
-        _sent_to_m(now),
-        _asked(now),
+        now_s=sample.now_s,
+        position_m=now.stem_m,
+        command_pa=command_pa,
+        pressure_pa=sample.pressure_pa,
+        reference_m=_sent_to_m(now),
+        faulty=before.fault is not NO_FAULT,
+        needs=lambda band: _needs(now, band),
     )
     return monitoring, supervise(
-        memory.supervision,
-        now.sample,
-        memory.command_pa,
+        before,
+        sample,
+        command_pa,
         now.requests,
         settings.limits,
         good=now.stem_m is not None,
@@ -273,22 +324,26 @@ def _supervised(now: Now) -> tuple[MonitorMemory, SupervisionMemory]:
     )
 
 
-def _asked(now: Now) -> Asked:
-    """Return who commands, and what is known of what the stem needs; S3 and an experiment find that out."""
+def _needs(now: Now, band: RestBand | None) -> Needs:
+    """Return who commands, and what is known of what the stem needs; S3 and an experiment find that out.
+
+    Args:
+        now: what the step is decided from.
+        band: the one before.
+    """
     memory, excitation = now.memory, now.memory.excitation
+    last, statics = memory.last, memory.statics
     signal = None if excitation is None or excitation.ended else excitation.signal
-    tried = signal is not None or memory.experiment.commands or memory.restoration.provisional
-    ratios = None if tried else memory.applied.ratios
+    tried = signal is not None or last.experiment.commands or last.restoration.provisional
+    ratios = None if tried else last.applied.ratios
     allowed_pa = 0.0
     if isinstance(signal, Staircase) and now.settings.staircase is not None:
         allowed_pa = signal.most_pa(now.settings.staircase)
-    return Asked(
-        faulty=memory.supervision.fault is not NO_FAULT,
-        by_law=memory.state in FOLLOWING,
-        pressure_pa=now.sample.pressure_pa,
-        band=rest_band(memory.monitoring.band, ratios, now.statics, now.settings.limits.stroke_m),
+    return Needs(
+        by_law=last.state in FOLLOWING,
+        band=rest_band(band, ratios, statics, now.settings.limits.stroke_m),
         allowed_pa=allowed_pa,
-        answers_s=now.statics.detector.answers.longest_s,
+        answers_s=statics.detector.answers.longest_s,
     )
 
 
@@ -296,7 +351,7 @@ def _excited(
     now: Now, supervision: SupervisionMemory, reference: Reference
 ) -> tuple[ActiveExcitation | None, InhibitReason, SlideOutcome | None]:
     """Return the excitation after this sample, what inhibits it, and what the last change of the command did."""
-    memory, settings, statics = now.memory, now.settings, now.statics
+    memory, settings, statics = now.memory, now.settings, now.memory.statics
     excitation, inhibit_reason = excitation_after(
         memory.excitation,
         supervision.mode,
@@ -306,7 +361,7 @@ def _excited(
         settings,
         held_pa=memory.wanted_pa,
         reference=reference,
-        ratios=memory.applied.ratios,
+        ratios=memory.last.applied.ratios,
         faulty=supervision.fault is not NO_FAULT,
     )
     if excitation is not None and memory.excitation is None and not excitation.ended:
@@ -318,57 +373,42 @@ def _excited(
     return excitation, excitation.inhibit_reason, outcome
 
 
-def _confirmed(
-    now: Now,
-    found: Applied,
-    outcome: SlideOutcome | None,
-    excitation: ActiveExcitation | None,
-    experiment: PlayedExperiment,
-    mode: Mode,
-) -> tuple[ControllerMemory, Applied, Restoration]:
-    """Return the memory, what is applied, and what has become of what was restored, after what a slide said of them."""
-    memory = now.memory
-    playing = experiment.commands
-    exciting = excitation is not None and not excitation.ended
-    restoration = _restoration(now, found, None if exciting or playing else outcome, mode)
-    if restoration.trust is Restored.DROPPED and memory.restoration.provisional:
-        return *_nothing_known(now, found), restoration
-    if outcome is not None and outcome.landing and not playing:
-        return memory, now.statics.corrected(found), restoration
-    return memory, found, restoration
-
-
 def _dead_band_m(now: Now, applied: Applied) -> float:
     """Return the error at rest that is left alone, m."""
-    settings = now.settings.dead_band
+    memory, settings = now.memory, now.settings.dead_band
     if settings.fixed_m is not None:
         return settings.fixed_m
-    return settings.in_force_m(now.statics.detector.noise_m, now.identification.estimates.breakaway, applied.ratios)
+    return settings.in_force_m(
+        memory.statics.detector.noise_m, memory.identification.estimates.breakaway, applied.ratios
+    )
 
 
-def _law(now: Now, seen: Seen) -> tuple[int, Law]:
-    """Return the law after this sample, and in which direction the stem goes by steps in its place, 0: it does not."""
+def _law(now: Now, before: Law, seen: Seen) -> tuple[int, Law]:
+    """Return the law after this sample, and in which direction the stem goes by steps in its place, 0: it does not.
+
+    It commands, and knows friction of one direction.
+    """
     memory, ratios = now.memory, seen.ratios
-    if ratios is None or not _knows_one_direction(now, ratios):
-        return 0, memory.law.observe(seen)
+    if ratios is None:
+        return 0, before.observe(seen)
     unseen, at_m = ratios.directions.unseen, now.sample.position_m
     asked_anew = seen.reference_m != memory.reference.value_m
     if not first_landing.goes_on(memory.first_landing, ratios, seen.reference_m - at_m, asked_anew=asked_anew):
-        law, stroke_m = memory.law.observe(seen), now.settings.limits.stroke_m
+        law, stroke_m = before.observe(seen), now.settings.limits.stroke_m
         if not first_landing.needed(unseen, ratios, law.command_pa, memory.wanted_pa, at_m, stroke_m):
             return 0, law
-    return unseen, memory.law.observe(seen._replace(ratios=None))
+    return unseen, before.observe(seen._replace(ratios=None))
 
 
-def _knows_one_direction(now: Now, ratios: Ratios | None) -> bool:
+def _knows_one_direction(settings: Settings, ratios: Ratios | None) -> bool:
     """Whether a law that commands by what friction is would do so in a direction in which it is not known."""
-    by_friction = now.settings.law.by_single_steps and now.settings.valve is None
+    by_friction = settings.law.by_single_steps and settings.valve is None
     return by_friction and ratios is not None and ratios.directions.unseen != 0
 
 
 def _stepped_pa(now: Now, direction: int, ratios: Ratios, reference: Reference) -> float:
     """Return the pressure of a stem on its way to its first landing in a direction, Pa: the next step once it rests."""
-    rest, wanted_pa, stroke_m = now.statics.detector.rest, now.memory.wanted_pa, now.settings.limits.stroke_m
+    rest, wanted_pa, stroke_m = now.memory.statics.detector.rest, now.memory.wanted_pa, now.settings.limits.stroke_m
     if rest is None or now.stem_m is None:
         return wanted_pa
     return first_landing.stepped_pa(wanted_pa, direction, ratios, reference.value_m - rest.position_m, stroke_m)
@@ -387,7 +427,7 @@ def _seen(
         direction=1 if reference.delta_m > 0.0 else -1 if reference.delta_m < 0.0 else 0,
         ratios=ratios,
         outcome=outcome,
-        statics=now.statics,
+        statics=now.memory.statics,
         valve=now.settings.valve,
     )
 
@@ -404,9 +444,9 @@ def _asked_pa(now: Now, consumed: ConsumedRequests, supervision: SupervisionMemo
 def _sent_to_m(now: Now) -> float | None:
     """Return where the law last sent the stem, m; None where it commands nothing."""
     memory, reference = now.memory, now.memory.reference
-    if reference.delta_m == 0.0 or memory.state is S3 or memory.supervision.mode is not AUTOMATIC:
+    if reference.delta_m == 0.0 or memory.last.state is S3 or memory.supervision.mode is not AUTOMATIC:
         return None
-    return reference.value_m if now.stem_m is None else sent_to_m(memory.cut_off, reference.value_m, now.stem_m)
+    return reference.value_m if now.stem_m is None else sent_to_m(memory.last.cut_off, reference.value_m, now.stem_m)
 
 
 def _experiment(now: Now, supervision: SupervisionMemory) -> PlayedExperiment:
@@ -415,7 +455,7 @@ def _experiment(now: Now, supervision: SupervisionMemory) -> PlayedExperiment:
     It may begin on a sample that is repeated or lost: how old the last good one may be, supervision watches.
     """
     memory, requests = now.memory, now.requests
-    before = memory.experiment
+    before = memory.last.experiment
     if before.is_idle(requests.experiment):
         return before
     around = Surroundings(
@@ -424,7 +464,7 @@ def _experiment(now: Now, supervision: SupervisionMemory) -> PlayedExperiment:
         fault=supervision.fault,
         excited=requests.eta[0] == 0,
         position_m=supervision.position_m,
-        command_pa=memory.command_pa,
+        command_pa=memory.last.command_pa,
         held_pa=memory.law.interrupted_pa(memory.wanted_pa),
     )
     return experiment_after(before, requests.experiment, around, now.settings.experiment)
@@ -440,11 +480,11 @@ def _outcome(now: Now) -> SlideOutcome | None:
         return None
     sample, wanted_pa = now.sample, now.memory.wanted_pa
     if sample.unattended_s > 0.0 or not _obeyed(now):
-        now.statics.detector.interrupt()
+        now.memory.statics.detector.interrupt()
         return None
     path, valve = now.memory.path, now.settings.valve
     arrived = path is None or valve is None or path.has_arrived(sample.now_s, valve.inverse)
-    return now.statics.update(sample.now_s, now.stem_m, wanted_pa, sample.pressure_pa, arrived=arrived)
+    return now.memory.statics.update(sample.now_s, now.stem_m, wanted_pa, sample.pressure_pa, arrived=arrived)
 
 
 def _obeyed(now: Now) -> bool:
@@ -452,7 +492,7 @@ def _obeyed(now: Now) -> bool:
     held_pa = now.sample.held_pa
     if now.sample.restarted:
         return False
-    return held_pa is None or abs(held_pa - now.memory.command_pa) <= now.settings.limits.restart_tolerance_pa
+    return held_pa is None or abs(held_pa - now.memory.last.command_pa) <= now.settings.limits.restart_tolerance_pa
 
 
 class Commanded(NamedTuple):
@@ -472,7 +512,7 @@ def _commanded(now: Now, asked_pa: float, *, lead: bool) -> Commanded | None:
     wanted_pa = settings.delivered_pa(limited_pa)
     path = _path(now, wanted_pa, lead=lead)
     command_pa = wanted_pa if path is None else path.command_pa
-    return Commanded(wanted_pa, command_pa, path) if isfinite(command_pa) else None
+    return Commanded(wanted_pa=wanted_pa, command_pa=command_pa, path=path) if isfinite(command_pa) else None
 
 
 def _held_instead(now: Now) -> Commanded:
@@ -480,7 +520,8 @@ def _held_instead(now: Now) -> Commanded:
     settings, memory = now.settings, now.memory
     action = settings.limits.action_on(Fault.COMMAND_NOT_FINITE)
     safe_pa = settings.delivered_pa(settings.safe_pa(action, memory.wanted_pa))
-    return Commanded(safe_pa, safe_pa, None if memory.path is None else long_held(safe_pa, now.sample.now_s))
+    path = None if memory.path is None else long_held(safe_pa, now.sample.now_s)
+    return Commanded(wanted_pa=safe_pa, command_pa=safe_pa, path=path)
 
 
 def _path(now: Now, wanted_pa: float, *, lead: bool) -> PathMemory | None:
@@ -496,11 +537,11 @@ def _path(now: Now, wanted_pa: float, *, lead: bool) -> PathMemory | None:
     return path._replace(command_pa=settings.delivered_pa(path.command_pa))
 
 
-def _nothing_known(now: Now, applied: Applied) -> tuple[ControllerMemory, Applied]:
+def _nothing_known(now: Now, applied: Applied) -> tuple[Applied, Law]:
     """Forget what was restored, with all that a law has learnt by it: nothing is left to command by."""
-    now.statics.restart()
+    now.memory.statics.restart()
     law = now.settings.law.begin(now.memory.wanted_pa)
-    return now.memory._replace(law=law), replace(applied, ratios=None, last_refusal=Refusal.CONTRADICTED_BY_LANDINGS)
+    return replace(applied, ratios=None, last_refusal=Refusal.CONTRADICTED_BY_LANDINGS), law
 
 
 def _waits(now: Now, mode: Mode) -> bool:
@@ -508,13 +549,13 @@ def _waits(now: Now, mode: Mode) -> bool:
 
     A law that commands all the while has no such moves.
     """
-    return _tries_restored(now, mode) and now.settings.law.by_single_steps and now.statics.detector.rest is None
+    return _tries_restored(now, mode) and now.settings.law.by_single_steps and now.memory.statics.detector.rest is None
 
 
 def _tries_restored(now: Now, mode: Mode) -> bool:
     """Whether a reference that is new would be followed by what was restored and is provisional."""
     memory, requests = now.memory, now.requests
-    if not memory.restoration.provisional or mode is not AUTOMATIC:
+    if not memory.last.restoration.provisional or mode is not AUTOMATIC:
         return False
     asked = requests.reference_writes != memory.consumed.reference_writes
     return asked and requests.reference_m != memory.reference.value_m
@@ -523,14 +564,15 @@ def _tries_restored(now: Now, mode: Mode) -> bool:
 def _restoration(now: Now, applied: Applied, outcome: SlideOutcome | None, mode: Mode) -> Restoration:
     """Return what has become of what was restored; an identification that is applied takes its place."""
     memory, stroke_m = now.memory, now.settings.limits.stroke_m
-    if applied.count != memory.applied.count:
-        return memory.restoration.replaced()
-    rest = now.statics.detector.rest
+    before = memory.last.restoration
+    if applied.count != memory.last.applied.count:
+        return before.replaced()
+    if not before.provisional:
+        return before
+    rest = memory.statics.detector.rest
     if outcome is None and rest is not None and now.stem_m is not None and _tries_restored(now, mode):
-        return memory.restoration.where_it_rests(
-            rest.position_m, rest.std_m, memory.wanted_pa, now.sample.now_s, stroke_m
-        )
-    return memory.restoration.after(outcome, stroke_m)
+        return before.where_it_rests(rest.position_m, rest.std_m, memory.wanted_pa, now.sample.now_s, stroke_m)
+    return before.after(outcome, stroke_m)
 
 
 def _consumed(now: Now, supervision: SupervisionMemory) -> ConsumedRequests:
@@ -542,8 +584,8 @@ def _consumed(now: Now, supervision: SupervisionMemory) -> ConsumedRequests:
     if mode is before and not by_hand:
         return consumed
     return ConsumedRequests(
-        requests.reference_writes if before is AUTOMATIC else consumed.reference_writes,
-        requests.manual_writes if before is MANUAL or by_hand else consumed.manual_writes,
+        reference_writes=requests.reference_writes if before is AUTOMATIC else consumed.reference_writes,
+        manual_writes=requests.manual_writes if before is MANUAL or by_hand else consumed.manual_writes,
     )
 
 
@@ -567,12 +609,12 @@ def _reference(now: Now, mode: Mode, consumed: ConsumedRequests, *, waits: bool)
         course = settings.after(course, now.sample.now_s, start.value_m, asked_m)
         asked_m = course.reference_m
     reference = start.follow(asked_m)
-    if reference.delta_m != 0.0 or memory.state is S3:
+    if reference.delta_m != 0.0 or memory.last.state is S3:
         return reference, course
     return Reference(stands_m).follow(asked_m), course
 
 
-def _held_pa(now: Now, state: State, supervision: SupervisionMemory) -> float:
+def _held_pa(now: Now, state: State, supervision: SupervisionMemory, law: Law) -> float:
     """Return what to hold: the last command, for a push what follows it; over S3 the one before it.
 
     After a fault what a device came back with, and what one shows that does not obey: it may be operated locally, and
@@ -584,9 +626,9 @@ def _held_pa(now: Now, state: State, supervision: SupervisionMemory) -> float:
             return sample.held_pa
         if sample.quality is Quality.GOOD and sample.status & DeviceStatus.NOT_READY:
             return sample.pressure_pa
-    if state is S3 or memory.state is S3:
+    if state is S3 or memory.last.state is S3:
         return memory.held_pa
-    return memory.law.interrupted_pa(memory.wanted_pa)
+    return law.interrupted_pa(memory.wanted_pa)
 
 
 def _pressure_pa(

@@ -1,6 +1,10 @@
-"""What the controller remembers from one step to the next, and what one step decides."""
+"""What the controller remembers from one step to the next, and what one step decides.
 
-from dataclasses import dataclass
+Both are tuples, for they are made anew in each step, and given by name: `tests/control/test_records.py` refuses a
+number by place.
+"""
+
+from copy import deepcopy
 from typing import NamedTuple
 
 from config.codes import Fault, InhibitReason, Mode, State
@@ -13,48 +17,11 @@ from positioner.control.reference import Reference
 from positioner.control.restoration import Restoration
 from positioner.control.supervision import SupervisionMemory
 from positioner.control.travel.course import OnCourse
-from positioner.control.travel.cutoffs import WITHIN
 from positioner.estimation.acceptance import Applied
 from positioner.estimation.estimates import Estimates
+from positioner.estimation.landings.static_identification import StaticIdentification
 from positioner.estimation.landings.static_law import StaticLaw
-
-
-@dataclass(frozen=True, slots=True)
-class ConsumedRequests:
-    """Counts of the writes whose mode was left since: a reference or a manual pressure does not come back by itself."""
-
-    reference_writes: int = 0
-    manual_writes: int = 0
-
-
-class ControllerMemory(NamedTuple):
-    """What the controller remembers from one step to the next; a tuple, for it is made anew in each."""
-
-    command_pa: float
-    """The last command given, ..."""
-    wanted_pa: float
-    """... and the pressure that it shall bring about: another, where it leads against a lag."""
-    held_pa: float
-    """What S0 holds, and what it gets back after S3."""
-    supervision: SupervisionMemory
-    monitoring: MonitorMemory
-    reference: Reference
-    applied: Applied
-    consumed: ConsumedRequests
-    state: State
-    excitation: ActiveExcitation | None
-    experiment: PlayedExperiment
-    identifying: bool
-    law: Law
-    path: PathMemory | None
-    """None: nothing is known of a pressure that arrives late."""
-    restoration: Restoration
-    cut_off: int
-    """The stop onto which the stem is pressed, see `travel.cutoffs`."""
-    course: OnCourse
-    """Of the reference in force to the one asked for."""
-    first_landing: int
-    """The direction in which the stem goes by steps to its first landing, 0: it does not; see `first_landing`."""
+from positioner.estimation.online import Identification
 
 
 class Decision(NamedTuple):
@@ -73,13 +40,54 @@ class Decision(NamedTuple):
     static_law: StaticLaw
     restoration: Restoration
     experiment: PlayedExperiment
-    alarms: tuple[Fault, ...] = ()
+    alarms: tuple[Fault, ...]
     """Monitors whose condition holds for their delay, be they alarms or faults."""
-    measured: bool = True
+    measured: bool
     """Whether there was a good measurement since the start."""
-    cut_off: int = WITHIN
-    """The stop onto which the stem is pressed."""
-    dead_band_m: float = 0.0
+    cut_off: int
+    """The stop onto which the stem is pressed, see `travel.cutoffs`."""
+    dead_band_m: float
     """Error at rest that is left alone."""
-    one_direction: bool = False
+    one_direction: bool
     """Whether the law needs friction of a direction in which it is not known."""
+
+
+class ConsumedRequests(NamedTuple):
+    """Counts of the writes whose mode was left since: a reference or a manual pressure does not come back by itself."""
+
+    reference_writes: int = 0
+    manual_writes: int = 0
+
+
+class ControllerMemory(NamedTuple):
+    """What the controller remembers from one step to the next.
+
+    The running integrals of both estimators go on in place: a memory is given to one step. `copied` gives another.
+    """
+
+    last: Decision
+    """What was decided last: the command given, the state, what is applied."""
+    wanted_pa: float
+    """The pressure that the last command shall bring about: another, where it leads against a lag."""
+    held_pa: float
+    """What S0 holds, and what it gets back after S3."""
+    supervision: SupervisionMemory
+    monitoring: MonitorMemory
+    reference: Reference
+    consumed: ConsumedRequests
+    excitation: ActiveExcitation | None
+    identifying: bool
+    law: Law
+    path: PathMemory | None
+    """None: nothing is known of a pressure that arrives late."""
+    course: OnCourse
+    """Of the reference in force to the one asked for."""
+    first_landing: int
+    """The direction in which the stem goes by steps to its first landing, 0: it does not; see `first_landing`."""
+    identification: Identification
+    statics: StaticIdentification
+
+    def copied(self) -> "ControllerMemory":
+        """Return another one of all that is known: what is done with either leaves no trace in the other."""
+        identification, statics = deepcopy((self.identification, self.statics))
+        return self._replace(identification=identification, statics=statics)

@@ -22,58 +22,88 @@ from positioner.estimation.acceptance import Applied, accept
 from positioner.estimation.estimates import Estimates
 from positioner.estimation.landings.static_identification import StaticIdentification
 from positioner.estimation.online import Identification
+from positioner.estimation.refiner import Refinement
 
 
 def identify(
     memory: ControllerMemory,
     excitation: ActiveExcitation | None,
     sample: Sample,
-    fresh: bool,
     requests: Requests,
-    identification: Identification,
-    statics: StaticIdentification,
+    refinement: Refinement | None,
     *,
+    fresh: bool,
     by_slides: bool,
 ) -> tuple[bool, Applied]:
-    """Run the estimators while eta_2 or eta_3 asks for it; what they find is applied when they are switched off."""
-    parameters, friction = requests.eta[1] == 0, requests.eta[2] == 0
-    under_way = excitation is not None and not excitation.ended
-    ordinary = excitation is None and not (by_slides and requests.eta[0] == 0)
-    wanted = (parameters or friction) and (under_way or ordinary)
-    staircase = None if memory.excitation is None else memory.excitation.signal
-    if memory.identifying and isinstance(staircase, Staircase) and not (wanted and under_way):
+    """Return whether the estimators run, and what is applied after this sample."""
+    applied = memory.last.applied
+    wanted = 0 in requests.eta[1:] and _moves_count(excitation, requests, by_slides=by_slides)
+    if _staircase_is_over(memory, excitation, wanted=wanted):
         broken_off = excitation is not None and (excitation.broken_off or excitation.unanswered)
-        return False, _concluded(memory.applied, staircase, statics, broken_off=broken_off)
-    if not wanted:
-        found = memory.identifying and not by_slides
-        return False, _accepted(memory.applied, identification, statics) if found else memory.applied
-    if not memory.identifying or (excitation is not None and memory.excitation is None):
+        return False, _concluded(memory, broken_off=broken_off)
+    if wanted:
+        begins = not memory.identifying or (excitation is not None and memory.excitation is None)
+        return True, _learnt(memory, sample, requests, refinement, begins=begins, fresh=fresh)
+    return False, _tested(memory) if memory.identifying and not by_slides else applied
+
+
+def _moves_count(excitation: ActiveExcitation | None, requests: Requests, *, by_slides: bool) -> bool:
+    """Whether the stem moves by what the estimators may learn from: an excitation under way, or ordinary moves.
+
+    Moves are no ordinary ones while eta_1 asks for a staircase: that has ended, or could not begin.
+    """
+    if excitation is not None:
+        return not excitation.ended
+    return not (by_slides and requests.eta[0] == 0)
+
+
+def _staircase_is_over(memory: ControllerMemory, excitation: ActiveExcitation | None, *, wanted: bool) -> bool:
+    """Whether a staircase from which was identified has ended with this sample, or eta_2 and eta_3 are switched off."""
+    if not memory.identifying or memory.excitation is None or not memory.excitation.by_slides:
+        return False
+    return excitation is None or excitation.ended or not wanted
+
+
+def _learnt(
+    memory: ControllerMemory,
+    sample: Sample,
+    requests: Requests,
+    refinement: Refinement | None,
+    *,
+    begins: bool,
+    fresh: bool,
+) -> Applied:
+    """Let the estimators take a sample; return what is applied: ordinary moves have no end, and are so one by one."""
+    identification = memory.identification
+    if begins:
         identification.restart()
     moves_before = identification.moves
     if fresh:
+        eta_1, eta_2, eta_3 = requests.eta
         identification.update(
             sample.time_s,
             sample.position_m,
             sample.pressure_pa,
-            parameters=parameters,
-            friction=friction,
-            passive=requests.eta[0] == 1,
+            parameters=eta_2 == 0,
+            friction=eta_3 == 0,
+            passive=eta_1 == 1,
+            refinement=refinement,
         )
-    # No excitation ends, so the estimates of ordinary moves are applied move by move.
-    move_identified = identification.moves != moves_before
-    return True, _accepted(memory.applied, identification, statics) if move_identified else memory.applied
+    return _tested(memory) if identification.moves != moves_before else memory.last.applied
 
 
-def _accepted(applied: Applied, identification: Identification, statics: StaticIdentification) -> Applied:
+def _tested(memory: ControllerMemory) -> Applied:
     """Return what is applied after motions: of a direction in which the stem did not move, what its landings say."""
-    return statics.completed(accept(applied, statics.tested(identification.estimates)))
+    statics = memory.statics
+    return statics.completed(accept(memory.last.applied, statics.tested(memory.identification.estimates)))
 
 
-def _concluded(applied: Applied, staircase: Staircase, statics: StaticIdentification, *, broken_off: bool) -> Applied:
+def _concluded(memory: ControllerMemory, *, broken_off: bool) -> Applied:
     """Return what is applied after a staircase; one that was complete had all that it wanted before."""
-    if broken_off and not staircase.complete:
-        return applied.refused(Refusal.BROKEN_OFF)
-    return statics.accepted(applied)
+    staircase = None if memory.excitation is None else memory.excitation.signal
+    if broken_off and not (isinstance(staircase, Staircase) and staircase.complete):
+        return memory.last.applied.refused(Refusal.BROKEN_OFF)
+    return memory.statics.accepted(memory.last.applied)
 
 
 def estimates_tested(

@@ -19,6 +19,7 @@ where nothing is known, half of what the pressure limits allow. The time for whi
 the same, for a law pushes one way and the other: to the delay, and to five times as long as the stem takes to answer.
 """
 
+from collections.abc import Callable
 from dataclasses import dataclass
 from math import inf
 from typing import NamedTuple
@@ -111,30 +112,39 @@ class MonitorSettings:
         )
 
 
-class Asked(NamedTuple):
+class Needs(NamedTuple):
     """Who commands, and what is known of what the stem needs.
 
     Attributes:
-        faulty: whether a fault is latched: then a safe action commands.
         by_law: whether the law commands.
-        pressure_pa: as measured.
         band: where the stem rests by what is known; None: that is not known, or is being found out.
         allowed_pa: what an excitation that finds it out allows itself.
         answers_s: how long the stem takes to answer a command; 0: that is not known.
     """
 
-    faulty: bool = False
-    by_law: bool = False
-    pressure_pa: float = inf
-    band: RestBand | None = None
-    allowed_pa: float = 0.0
-    answers_s: float = 0.0
+    by_law: bool
+    band: RestBand | None
+    allowed_pa: float
+    answers_s: float
 
-
-NOBODY = Asked()
 
 NEVER = (inf, inf, inf, inf, inf, inf)
 """No condition holds."""
+
+
+class Frozen(NamedTuple):
+    """What is known of a position that does not change, from its last change on."""
+
+    command_pa: float = inf
+    """The command then, ..."""
+    pressure_pa: float = inf
+    """... the measured pressure then ..."""
+    unanswered_s: float = 0.0
+    """... for how long since then no stem rests, ..."""
+    longest_s: float = 0.0
+    """... and for how long none need answer."""
+    band: RestBand | None = None
+    """What the valve was last known to need."""
 
 
 class MonitorMemory(NamedTuple):
@@ -146,16 +156,10 @@ class MonitorMemory(NamedTuple):
     good_s: float = inf
     position_m: float = inf
     """The last good one, and when; infinite before there was one."""
-    unmoved_pa: float = inf
-    """The command when it last changed, ..."""
-    unmoved_measured_pa: float = inf
-    """... the measured pressure then ..."""
-    unanswered_s: float = 0.0
-    """... and for how long since then no stem rests."""
+    frozen: Frozen = Frozen()
+    """Of that one, since it last changed."""
     command_pa: float | None = None
     """The last seen, while no fault was latched."""
-    band: RestBand | None = None
-    """What the valve is known to need."""
     holding: tuple[Fault, ...] = ()
     """Those whose condition has held for their delay."""
 
@@ -168,11 +172,14 @@ class MonitorMemory(NamedTuple):
 def after_cycle(
     memory: MonitorMemory,
     settings: MonitorSettings,
+    *,
     now_s: float,
     position_m: float | None,
     command_pa: float,
+    pressure_pa: float,
     reference_m: float | None,
-    asked: Asked = NOBODY,
+    faulty: bool,
+    needs: Callable[[RestBand | None], Needs],
 ) -> MonitorMemory:
     """Return what is known after a cycle.
 
@@ -181,28 +188,39 @@ def after_cycle(
         now_s: on the clock of the cycle.
         position_m: None in a cycle without a good measurement.
         command_pa: the last given.
+        pressure_pa: as measured.
         reference_m: where the stem is asked to be; None where nobody asks.
-        asked: who commands, and what is known of what the stem needs.
+        faulty: whether a fault is latched: then a safe action commands.
+        needs: what the stem needs, and the band before; asked only of one that stands still under another command.
     """
-    faulty = asked.faulty
     elapsed_s = now_s - memory.seen_s
     overrun = elapsed_s > settings.overrun_s
     before_pa, seen_pa = memory.command_pa, None if faulty else command_pa
-    change_pa = 0.0 if before_pa is None or faulty else abs(command_pa - before_pa)
-    fast = change_pa > settings.rate_pa_per_s * elapsed_s > 0.0
+    fast = (
+        seen_pa != before_pa
+        and before_pa is not None
+        and seen_pa is not None
+        and abs(seen_pa - before_pa) > settings.rate_pa_per_s * elapsed_s > 0.0
+    )
     if position_m is None:
         since_s, holding = _held(memory, settings, now_s, (False, False, False, False, overrun, fast))
         return memory._replace(since_s=since_s, seen_s=now_s, command_pa=seen_pa, holding=holding)
     way_m, passed_s = abs(position_m - memory.position_m), now_s - memory.good_s
     inside = settings.low_m < position_m < settings.high_m
-    unmoved_pa, unmoved_measured_pa, unanswered_s = memory.unmoved_pa, memory.unmoved_measured_pa, memory.unanswered_s
+    frozen = memory.frozen
     if way_m != 0.0:
-        unmoved_pa, unmoved_measured_pa, unanswered_s = command_pa, asked.pressure_pa, 0.0
-    elif inside and _unanswered(memory, settings, position_m, command_pa, asked):
-        unanswered_s += passed_s
+        frozen = Frozen(command_pa=command_pa, pressure_pa=pressure_pa, band=frozen.band)
+    elif inside and command_pa != frozen.command_pa and settings.frozen_at < inf:
+        needed = needs(frozen.band)
+        rests = _rests(frozen, settings, needed, position_m, command_pa=command_pa, pressure_pa=pressure_pa)
+        frozen = frozen._replace(
+            unanswered_s=frozen.unanswered_s + (0.0 if rests else passed_s),
+            longest_s=max(settings.frozen_s, ANSWERS * needed.answers_s or UNKNOWN_S),
+            band=needed.band,
+        )
     conditions = (
         reference_m is not None and abs(reference_m - position_m) > settings.deviation_m,
-        unanswered_s > max(settings.frozen_s, ANSWERS * asked.answers_s or UNKNOWN_S),
+        frozen.unanswered_s > frozen.longest_s,
         way_m > settings.rate_m_per_s * passed_s > 0.0,
         inside and not settings.low_pa <= command_pa <= settings.high_pa,
         overrun,
@@ -210,34 +228,35 @@ def after_cycle(
     )
     since_s, holding = _held(memory, settings, now_s, conditions)
     return MonitorMemory(
-        since_s,
-        now_s,
-        now_s,
-        position_m,
-        unmoved_pa,
-        unmoved_measured_pa,
-        unanswered_s,
-        seen_pa,
-        asked.band,
-        holding,
+        since_s=since_s,
+        seen_s=now_s,
+        good_s=now_s,
+        position_m=position_m,
+        frozen=frozen,
+        command_pa=seen_pa,
+        holding=holding,
     )
 
 
-def _unanswered(
-    memory: MonitorMemory, settings: MonitorSettings, position_m: float, command_pa: float, asked: Asked
+def _rests(
+    frozen: Frozen,
+    settings: MonitorSettings,
+    needed: Needs,
+    position_m: float,
+    *,
+    command_pa: float,
+    pressure_pa: float,
 ) -> bool:
-    """Whether no stem rests at a position that has not changed, m, under a command, Pa."""
-    went_pa, measured = abs(command_pa - memory.unmoved_pa), asked.pressure_pa
-    if went_pa == 0.0 or settings.frozen_at == inf:
-        return False
-    if asked.band is None:
-        return went_pa > max(NOTHING_KNOWN * settings.span_pa, asked.allowed_pa)
-    low_pa, high_pa = asked.band.pressures_pa(position_m, settings.frozen_at)
-    if not asked.by_law:
-        return went_pa > high_pa - low_pa
-    if abs(memory.unmoved_measured_pa - memory.unmoved_pa) > ACTUATOR * settings.span_pa:
-        measured = command_pa
-    return max(command_pa, measured) < low_pa or min(command_pa, measured) > high_pa
+    """Whether a stem may rest at a position that has not changed, m, under another command than then."""
+    went_pa = abs(command_pa - frozen.command_pa)
+    if needed.band is None:
+        return went_pa <= max(NOTHING_KNOWN * settings.span_pa, needed.allowed_pa)
+    low_pa, high_pa = needed.band.pressures_pa(position_m, settings.frozen_at)
+    if not needed.by_law:
+        return went_pa <= high_pa - low_pa
+    actuator = abs(frozen.pressure_pa - frozen.command_pa) <= ACTUATOR * settings.span_pa
+    measured_pa = pressure_pa if actuator else command_pa
+    return max(command_pa, measured_pa) >= low_pa and min(command_pa, measured_pa) <= high_pa
 
 
 def _held(

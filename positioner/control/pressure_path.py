@@ -46,7 +46,14 @@ class PathMemory(NamedTuple):
 
 def long_held(pressure_pa: float, now_s: float = 0.0) -> PathMemory:
     """Return the memory, at a time, of a command long held."""
-    return PathMemory(pressure_pa, pressure_pa, 0.0, pressure_pa, now_s, -inf)
+    return PathMemory(
+        wanted_pa=pressure_pa,
+        pressure_pa=pressure_pa,
+        change_pa=0.0,
+        command_pa=pressure_pa,
+        now_s=now_s,
+        arrived_s=-inf,
+    )
 
 
 def after_step(
@@ -76,7 +83,14 @@ def after_step(
     arrived_s = inf
     if arrived:
         arrived_s = min(memory.arrived_s, now_s) if wanted_pa == memory.wanted_pa else now_s
-    return PathMemory(wanted_pa, pressure_pa, change_pa, command_pa, now_s, arrived_s)
+    return PathMemory(
+        wanted_pa=wanted_pa,
+        pressure_pa=pressure_pa,
+        change_pa=change_pa,
+        command_pa=command_pa,
+        now_s=now_s,
+        arrived_s=arrived_s,
+    )
 
 
 def _carried(pressure_pa: float, command_pa: float, h: float, inverse: Inverse) -> float:

@@ -123,17 +123,17 @@ def supervise(
     acknowledged = requests.acknowledgements != memory.acknowledgements
     fault = cause or (NO_FAULT if acknowledged else memory.fault)
     return SupervisionMemory(
-        _mode(memory, requests, fault, limits),
-        fault,
-        bad_in_a_row,
-        lost_in_a_row,
-        good_s,
-        heartbeat_s,
-        requests.mode_writes,
-        requests.acknowledgements,
-        requests.heartbeats,
-        sample.position_m if good else memory.position_m,
-        (command_pa,) if good else given_pa,
+        mode=_mode(memory, requests, fault, limits),
+        fault=fault,
+        bad_in_a_row=bad_in_a_row,
+        lost_in_a_row=lost_in_a_row,
+        good_s=good_s,
+        heartbeat_s=heartbeat_s,
+        mode_writes=requests.mode_writes,
+        acknowledgements=requests.acknowledgements,
+        heartbeats=requests.heartbeats,
+        position_m=sample.position_m if good else memory.position_m,
+        unanswered_pa=(command_pa,) if good else given_pa,
     )
 
 

@@ -5,8 +5,9 @@ the record at its old end. So when motion is detected, its beginning is still to
 there; when the stem is found to have stopped, the samples of the standstill that were taken for motion are dropped
 unused. The estimates are one derivative window old for that, and say so by `time_s`.
 
-With a `Refiner`, the samples since the restart go out to be fitted by maximum likelihood when the window is complete,
-and the progress stays short of 1 until the result is back: it replaces the algebraic one if it is acceptable. With
+Where somebody refines (`Refinement`), the samples since the restart are to be fitted by maximum likelihood when the
+window is complete: a job, which is taken (`taken_job`). The progress stays short of 1 until the result is back: it
+replaces the algebraic one if it is acceptable. With
 eta_1 = 1 (`passive`), no excitation will fill a window: each ordinary move goes out when the stem has come to rest,
 with the posterior of the moves before it as the prior (`passive`).
 """
@@ -25,7 +26,7 @@ from positioner.estimation.estimates import NO_BREAKAWAY, Directions, Estimate, 
 from positioner.estimation.friction_estimator import RunningMeans
 from positioner.estimation.motion_detector import MotionDetector, motion_start
 from positioner.estimation.passive import MovesPosterior, posterior_after
-from positioner.estimation.refiner import RefinementJob, Refiner
+from positioner.estimation.refiner import Refinement, RefinementJob
 from positioner.estimation.running_noise import PositionNoise
 from positioner.estimation.sample_window import SampleWindow
 from positioner.estimation.validity import ValidityCheck
@@ -95,9 +96,10 @@ class Identification:
         moves: ordinary moves that gave acceptable estimates, by passive identification.
     """
 
-    def __init__(self, settings: IdentificationSettings, refiner: Refiner | None = None) -> None:
+    def __init__(self, settings: IdentificationSettings) -> None:
         self._settings = settings
-        self._refiner = refiner
+        self._refinement: Refinement | None = None
+        self._job: RefinementJob | None = None
         self._kept: list[tuple[float, float, float]] = []
         self._awaited_since_s: float | None = None
         self._posterior: MovesPosterior | None = None
@@ -145,6 +147,7 @@ class Identification:
         parameters: bool,
         friction: bool,
         passive: bool = False,
+        refinement: Refinement | None = None,
     ) -> Estimates:
         """Take a fresh sample.
 
@@ -158,15 +161,17 @@ class Identification:
             parameters: whether to identify a, b, c.
             friction: whether to estimate k, from a, b, c of this identification or of the last one.
             passive: whether the stem moves as the DCS asks, without excitation.
+            refinement: as it stands; None where nobody refines.
         """
         if not (isfinite(time_s) and isfinite(position_m) and isfinite(pressure_pa)):
             return self.estimates
         if (parameters, friction) != self._requested:
             self._request(parameters, friction)
-        self._passive = passive and self._refiner is not None
+        self._refinement = refinement
+        self._passive = passive and refinement is not None
         self._take(time_s, position_m, pressure_pa)
-        if self._refiner is not None:
-            self._refine(self._refiner, time_s, position_m, pressure_pa)
+        if refinement is not None:
+            self._refine(refinement, time_s, position_m, pressure_pa)
         if self._record.full:
             self._detect_motion()
             wanted = any(self._requested) and not self._complete and not self._passive
@@ -179,7 +184,12 @@ class Identification:
         known = self._settings.noise_std_m
         return self._noise.std_m if known is None else known
 
-    def _refine(self, refiner: Refiner, time_s: float, position_m: float, pressure_pa: float) -> None:
+    def taken_job(self) -> RefinementJob | None:
+        """Return the job that is to be done since the last update, once."""
+        job, self._job = self._job, None
+        return job
+
+    def _refine(self, refinement: Refinement, time_s: float, position_m: float, pressure_pa: float) -> None:
         """Keep the sample, hand out what is complete, take what comes back."""
         kept = self._kept
         if kept and time_s <= kept[-1][0]:
@@ -191,18 +201,17 @@ class Identification:
             self._rest_in -= 1
             if self._rest_in <= 0:
                 self._rest_in = None
-                self._hand_out(refiner, time_s)
-        result = refiner.collect()
-        if result is not None:
-            self._take_refined(result, time_s)
+                self._hand_out(time_s)
+        if refinement.result is not None:
+            self._take_refined(refinement.result, time_s)
         elif self._awaited_since_s is not None and (
-            not refiner.pending or time_s - self._awaited_since_s > REFINEMENT_TIMEOUT_S
+            not refinement.pending or time_s - self._awaited_since_s > REFINEMENT_TIMEOUT_S
         ):
             self._awaited_since_s = None
             self.estimates = replace(self.estimates, progress=1.0)
 
-    def _hand_out(self, refiner: Refiner, time_s: float) -> None:
-        """Let what was kept be fitted."""
+    def _hand_out(self, time_s: float) -> None:
+        """Let what was kept be fitted; what nobody takes, for a job is under way or nobody is there, is not awaited."""
         settings = self._settings
         columns = np.array(self._kept).T
         asked = BatchSettings(
@@ -213,9 +222,10 @@ class Identification:
             largest_relative_std=settings.largest_relative_std,
         )
         prior = self._posterior.prior(time_s) if self._passive and self._posterior is not None else None
-        if refiner.submit(RefinementJob(columns[0], columns[1], columns[2], asked, prior)) and not self._passive:
+        self._job = RefinementJob(columns[0], columns[1], columns[2], asked, prior)
+        if not self._passive:
             self._awaited_since_s = time_s
-        if self._passive:
+        else:
             self._kept = [each for each in self._kept if each[0] > time_s - MOVE_REST_S]
 
     def _take_refined(self, result: BatchResult, time_s: float) -> None:
@@ -315,10 +325,9 @@ class Identification:
         if self._elapsed_s >= self._next_reading_s or self._complete:
             self._next_reading_s += settings.window_s / READINGS
             self._publish(self._read(time_s))
-        if self._complete and self._refiner is not None and not self._passive:
-            self._hand_out(self._refiner, float(self._record.time_s[-1]))
-            if self._awaited_since_s is not None:
-                self.estimates = replace(self.estimates, progress=PROGRESS_WHILE_REFINING)
+        if self._complete and self._refinement is not None and not self._passive:
+            self._hand_out(float(self._record.time_s[-1]))
+            self.estimates = replace(self.estimates, progress=PROGRESS_WHILE_REFINING)
 
     def _read(self, time_s: float) -> Estimates:
         """Return what the window says so far."""

@@ -1,12 +1,13 @@
 """The refinement of an identification: a job goes out, its result comes back, at once or some cycles later.
 
-The control core hands a job to a `Refiner` and asks at each sample whether the result is there. In virtual time it is
-computed by `InProcessRefiner`; the daemon has a process of its own for it (`positioner.daemon.refinement_process`), for
-a fit of some tens of milliseconds has no place in a cycle of one.
+What the control core wants refined it leaves in its memory. Who keeps that hands it to a `Refiner`, and tells the core
+at each sample how the refinement stands: so the core asks nobody. In virtual time a job is computed by
+`InProcessRefiner`; the daemon has a process of its own for it (`positioner.daemon.refinement_process`), for a fit of
+some tens of milliseconds has no place in a cycle of one.
 """
 
 from dataclasses import dataclass
-from typing import Protocol
+from typing import NamedTuple, Protocol
 
 from positioner.estimation.array import Array
 from positioner.estimation.batch import BatchResult, BatchSettings, identify
@@ -26,6 +27,20 @@ class RefinementJob:
     def run(self) -> BatchResult:
         """Run it."""
         return identify(self.time_s, self.position_m, self.pressure_pa, self.settings, self.prior)
+
+
+class Refinement(NamedTuple):
+    """How the refinement stands at a sample."""
+
+    result: BatchResult | None = None
+    """Of the last job, once."""
+    pending: bool = False
+    """Whether one is still to come."""
+
+    @classmethod
+    def of(cls, refiner: "Refiner") -> "Refinement":
+        """Return how it stands with a refiner."""
+        return cls(result=refiner.collect(), pending=refiner.pending)
 
 
 class Refiner(Protocol):

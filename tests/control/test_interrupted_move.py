@@ -270,7 +270,7 @@ def test_an_identification_begun_meanwhile_and_broken_off_comes_back() -> None:
 def test_an_outage_while_the_stem_moves_is_not_learnt_as_its_slowness(dark_s: float) -> None:
     """After 8 s the next moves took 29, 22, 18 and 14 s, after 120 s one had not begun after four minutes."""
     loop = loop_of().away()
-    before = loop.cycle._controller._statics.detector.answers
+    before = loop.cycle._controller._memory.statics.detector.answers
     loop.driver.spoil = absurd
     loop.run(dark_s)
     loop.driver.spoil = lambda reading: reading
@@ -280,5 +280,5 @@ def test_an_outage_while_the_stem_moves_is_not_learnt_as_its_slowness(dark_s: fl
         loop.step_to(at)
         loop.run(4.0)
         assert abs(loop.position - at) < THERE
-    answers = loop.cycle._controller._statics.detector.answers
+    answers = loop.cycle._controller._memory.statics.detector.answers
     assert answers.longest_s < 2.0 * before.longest_s + PERIOD_S

@@ -8,7 +8,9 @@ import numpy as np
 import numpy.typing as npt
 from scipy.linalg import expm
 
+from positioner.estimation.estimates import Estimates
 from positioner.estimation.online import Identification, IdentificationSettings
+from positioner.estimation.refiner import InProcessRefiner, Refinement
 
 Array = npt.NDArray[np.float64]
 
@@ -86,6 +88,21 @@ def identified(
     identification.restart()
     feed(identification, run, parameters=parameters, friction=friction)
     return identification
+
+
+class Refined(Identification):
+    """An identification with somebody who refines it."""
+
+    def __init__(self, settings: IdentificationSettings) -> None:
+        super().__init__(settings)
+        self._refiner = InProcessRefiner()
+
+    def update(self, *sample: float, **asked: bool) -> Estimates:  # type: ignore[override]
+        """Take a sample, and let what it completes be refined."""
+        estimates = super().update(*sample, **asked, refinement=Refinement.of(self._refiner))
+        if (job := self.taken_job()) is not None:
+            self._refiner.submit(job)
+        return estimates
 
 
 def feed(identification: Identification, run: Run, *, parameters: bool = True, friction: bool = True) -> None:

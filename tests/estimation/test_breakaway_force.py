@@ -9,10 +9,9 @@ from config.codes import Refusal
 from config.valve_file import load_valve, shipped_valve
 from positioner.estimation.breakaway_force import after_event, from_interval, intersection, with_validity
 from positioner.estimation.estimates import Estimate, no_estimate
-from positioner.estimation.online import Identification, IdentificationSettings
-from positioner.estimation.refiner import InProcessRefiner
+from positioner.estimation.online import IdentificationSettings
 from sim.valve import Valve
-from tests.estimation.stem import AREA, COULOMB, NOISE, SPRING, STATIC, STROKE
+from tests.estimation.stem import AREA, COULOMB, NOISE, SPRING, STATIC, STROKE, Refined
 
 PERIOD_S, EVERY_S = 2e-3, 20.0
 
@@ -52,7 +51,7 @@ def test_ordinary_moves_tell_the_static_friction_if_they_begin_slowly(ramp_s: fl
     valve = Valve.from_file(load_valve(shipped_valve("seed")))
     valve.rest_at(0.05)
     pressure_pa, rng = valve.pressure_pa, np.random.default_rng(0)
-    identification = Identification(IdentificationSettings(stroke_m=STROKE, pressure_pa=4e5), InProcessRefiner())
+    identification = Refined(IdentificationSettings(stroke_m=STROKE, pressure_pa=4e5))
     identification.restart()
     for move in range(8):
         target_m = STROKE * float(rng.uniform(0.3, 0.8))

@@ -53,4 +53,5 @@ class Course:
             before = OnCourse.begun(from_m, before.at_s)
         lasted_s = max(now_s - before.at_s, 0.0)
         filtered_m = self.low_pass.after(before.filtered_m, asked_m, lasted_s)
-        return OnCourse(filtered_m, self.ramp.after(before.reference_m, filtered_m, lasted_s), now_s)
+        reference_m = self.ramp.after(before.reference_m, filtered_m, lasted_s)
+        return OnCourse(filtered_m=filtered_m, reference_m=reference_m, at_s=now_s)

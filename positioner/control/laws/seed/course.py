@@ -41,7 +41,7 @@ class Course(NamedTuple):
             stroke_m: full travel.
         """
         if (reference_m, changed) != (self.reference_m, self.changed):
-            return Course(reference_m, changed, 1 if changed > 0 else -1)
+            return Course(reference_m=reference_m, changed=changed, direction=1 if changed > 0 else -1)
         if rest_m is None:
             return self
         under_another = command_pa != self.command_pa

@@ -89,8 +89,8 @@ class Plan:
         s, way_m = (1 if error_m > 0 else -1), abs(error_m)
         on_m = max(self.back_m(-s), self.way_m(s) - way_m)
         round_m = max(self.back_m(s), self.way_m(-s) + way_m)
-        by_its_side = Excursion(s, self.target_m + s * on_m, on_m)
-        by_the_other = Excursion(-s, self.target_m - s * round_m, round_m - way_m)
+        by_its_side = Excursion(direction=s, by_m=self.target_m + s * on_m, beyond_m=on_m)
+        by_the_other = Excursion(direction=-s, by_m=self.target_m - s * round_m, beyond_m=round_m - way_m)
         leaves_m = round_m if begun else self.bounds.thresholds.other_side * by_the_other.beyond_m
         return [by_its_side, by_the_other] if on_m <= leaves_m else [by_the_other, by_its_side]
 

@@ -1,0 +1,105 @@
+"""The control core is a function of what it is given; a memory that is copied is another one."""
+
+from array import array
+from collections import deque
+from collections.abc import Mapping, Sequence
+from dataclasses import replace
+from functools import cache
+from types import MethodType
+
+import numpy as np
+import pytest
+
+from config.codes import Mode, Quality
+from config.daemon_file import DaemonFile
+from config.slave_file import SlaveFile
+from config.valve_file import shipped_valve
+from positioner.control.controller import first_memory, step
+from positioner.control.controller_memory import ControllerMemory
+from positioner.control.requests import QUIET, Requests
+from positioner.control.sample import Sample
+from positioner.control.settings import Settings
+from positioner.daemon.snapshot import Snapshot
+from positioner.estimation.refiner import Refinement
+from positioner.virtual.virtual_cycle import played, virtual_cycle
+from sim.slave.modbus_slave import device_of
+
+STROKE_M = 0.1016
+LAWS = {"seed": 44e3, "slides": 0.0}
+"""With what alpha, Pa, each is identified: by a sine, or by slides, which ask for none."""
+Inputs = Sequence[tuple[Sample, Requests]]
+
+
+def daemon(law: str) -> DaemonFile:
+    known = {"b_over_c_pa_per_m": -7.9e5, "k_over_c_pa": -2.4e4}
+    table = {"valve": {"stroke_m": STROKE_M}, "cycle": {"pace": "device", "period_s": 5e-3}, "control": {"law": law}}
+    return DaemonFile.model_validate({**table, "law": known})
+
+
+@cache
+def inputs(law: str) -> tuple[tuple[Sample, Requests], ...]:
+    """Two seconds of S3, then steps of the reference: all that the core is given of it."""
+    slave = SlaveFile.model_validate({"clock": {"mode": "lockstep"}, "sensor": {"noise_std_m": 1e-5}})
+    first = Requests(mode=Mode.AUTOMATIC, mode_writes=1, alpha_pa=LAWS[law], beta_pa=13e3, eta=(0, 0, 0))
+    cycle = virtual_cycle(daemon(law), device_of(slave, shipped_valve("seed")), first)
+    given = []
+
+    def dcs(snapshot: Snapshot, requests: Requests) -> Requests:
+        given.append((snapshot.sample, requests))
+        if snapshot.sample.time_s < 1.0:
+            return requests
+        writes = int(2.0 * snapshot.sample.time_s)
+        return replace(requests, eta=QUIET, reference_m=(0.3 + 0.2 * (writes % 3)) * STROKE_M, reference_writes=writes)
+
+    for _ in played(cycle, dcs, 3.0):
+        pass
+    return tuple(given)
+
+
+def decided(memory: ControllerMemory, settings: Settings, given: Inputs) -> tuple[ControllerMemory, list[str]]:
+    """Return the memory after inputs, and what was decided, to the last bit; NaN is itself."""
+    decisions = []
+    for sample, requests in given:
+        memory, decision = step(memory, sample, requests, settings, Refinement())
+        decisions.append(repr(decision))
+    return memory, decisions
+
+
+def whole(thing: object) -> object:
+    """Return all that a memory holds, to the last bit, as what can be compared."""
+    if isinstance(thing, np.ndarray | array):
+        return thing.tobytes()
+    if isinstance(thing, Mapping):
+        return [(key, whole(each)) for key, each in thing.items()]
+    if isinstance(thing, list | tuple | deque):
+        return [whole(each) for each in thing]
+    if type(thing).__module__.startswith("positioner.estimation") and hasattr(thing, "__dict__"):
+        return whole(vars(thing))
+    return repr(thing) if not isinstance(thing, MethodType) else thing.__func__.__name__
+
+
+def spoilt(given: Inputs, rng: np.random.Generator) -> Inputs:
+    """Another future: lost replies, another position, a stem that jumps, a mode that is written."""
+    return [
+        (
+            replace(sample, position_m=sample.position_m + rng.normal(0.0, 1e-3), quality=rng.choice(list(Quality))),
+            replace(requests, eta=(0, 0, 0) if rng.random() < 0.2 else QUIET),
+        )
+        for sample, requests in given
+    ]
+
+
+@pytest.mark.parametrize("law", LAWS)
+@pytest.mark.parametrize("seed", range(2))
+def test_the_same_memory_and_inputs_give_the_same_and_a_copy_leaves_no_trace(law: str, seed: int) -> None:
+    settings, given, rng = Settings.of(daemon(law)), inputs(law), np.random.default_rng(seed)
+    at, ahead = int(rng.integers(20, len(given) - 60)), 60
+    before, _ = decided(first_memory(settings, 0.0), settings, given[:at])
+    then, untouched = given[at : at + ahead], whole(before)
+    after, once = decided(before.copied(), settings, then)
+    _, other = decided(before.copied(), settings, spoilt(then, rng))
+    assert whole(before) == untouched
+    assert whole(after) != untouched
+    original, decisions = decided(before, settings, then)
+    assert decisions == once != other
+    assert whole(original) == whole(after)
