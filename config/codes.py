@@ -282,6 +282,17 @@ class Ne107Cause(Code):
     MODEL_CHANGED = 27, "the spring is not the one identified first"
 
 
+class EndTrend(Code):
+    """What the closed end position has done over the last days."""
+
+    NOT_KNOWN = 0, "not known: shut on too few days"
+    STEADY = 1, "steady"
+    RISING = 2, "rising: the plug seats ever higher, something grows on the seat or lies under it"
+    FALLING = 3, "falling: the plug seats ever lower, the seat wears"
+    JUMPED = 4, "jumped: the zero has shifted"
+    SCATTERED = 5, "scattered: the plug seats elsewhere each time"
+
+
 class AlarmState(Code):
     """What becomes of an alarm (ISA-18.2)."""
 

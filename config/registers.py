@@ -11,6 +11,7 @@ from itertools import chain
 from typing import Literal
 
 from config.codes import (
+    EndTrend,
     EventKind,
     ExperimentState,
     Fault,
@@ -277,6 +278,14 @@ HEALTH = (
     Register("stem_cycles", 514, "uint32", "1", "full strokes up and down that the travel amounts to"),
     Register("reversals", 516, "uint32", "1", "how often the stem turned round"),
     Register("stiction_index", 518, "float32", "1", "part of the last moves asked for that the stem did not make"),
+    Register("away_mean", 522, "float32", "p.u.", "reference in force less position, mean size today in automatic"),
+    Register("saturated", 524, "float32", "1", "share of today for which the command is at a limit"),
+    Register("course_deviation", 526, "float32", "p.u.", "how far the stem rests outside what is identified, today"),
+    Register("pressure_short", 528, "float32", "1", "command less measured pressure today, of the span: a leak"),
+    Register("supply_short", 530, "float32", "1", "the same under commands in the upper fifth: the supply"),
+    Register("end_closed", 532, "float32", "p.u.", "opening where the valve is pressed shut, mean of today"),
+    Register("end_trend", 534, "uint16", "1", f"of that over the last days: {listed(EndTrend)}"),
+    Register("exhausted", 536, "float32", "1", "air let out today, in volumes of the actuator at atmospheric pressure"),
     Register("moves_judged", 520, "uint32", "1", "moves behind the stiction index"),
 )
 

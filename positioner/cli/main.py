@@ -31,6 +31,7 @@ COMMANDS = (
     "steps",
     "discriminate",
     "map",
+    "health",
     "alarms",
     "events",
     "metrics",

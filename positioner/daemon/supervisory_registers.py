@@ -50,6 +50,7 @@ from positioner.daemon.cycle import Cycle
 from positioner.daemon.cycle_statistics import CycleStatistics
 from positioner.daemon.experiment_registers import WriteRejected, experiment_asked, experiment_getters
 from positioner.daemon.health import Health, ne107_condition
+from positioner.daemon.health.operation import end_trend
 from positioner.daemon.local_switch import require_let_in
 from positioner.daemon.logs import log_event, logging_valve
 from positioner.daemon.service_state import state_by_mode
@@ -409,6 +410,21 @@ def _health_getters(cycle: Cycle, stroke_m: float) -> dict[str, Getter]:
         "reversals": lambda _s, _r: health.record.reversals,
         "stiction_index": lambda _s, _r: health.record.stiction_index,
         "moves_judged": lambda _s, _r: health.record.moves_judged,
+        **_operation_getters(health),
+    }
+
+
+def _operation_getters(health: Health) -> dict[str, Getter]:
+    operation = health.operation
+    return {
+        "away_mean": lambda _s, _r: operation.today.away.value,
+        "saturated": lambda _s, _r: operation.today.saturated_share,
+        "course_deviation": lambda _s, _r: operation.today.course.value,
+        "pressure_short": lambda _s, _r: operation.today.short.value,
+        "supply_short": lambda _s, _r: operation.today.short_high.value,
+        "end_closed": lambda _s, _r: operation.today.shut.value,
+        "end_trend": lambda _s, _r: end_trend([each.shut.value for each in operation.days]),
+        "exhausted": lambda _s, _r: operation.today.exhausted,
     }
 
 

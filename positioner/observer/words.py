@@ -6,6 +6,7 @@ from dataclasses import dataclass
 
 from config.codes import (
     Code,
+    EndTrend,
     EventKind,
     ExperimentState,
     Fault,
@@ -34,6 +35,7 @@ CODES: dict[str, type[Code]] = {
     "experiment_state": ExperimentState,
     "ne107": Ne107Status,
     "ne107_cause": Ne107Cause,
+    "end_trend": EndTrend,
     "event": EventKind,
     "event_class": Ne107Status,
 }

@@ -13,8 +13,10 @@ from pathlib import Path
 
 from pydantic import Field, ValidationError
 
-from config.loading import NonNegative, Schema
+from config.errors import InputError
+from config.loading import Many, NonNegative, Schema
 from config.whole_file import replace_whole
+from positioner.daemon.health.operation import OperationDay
 from positioner.daemon.health.valve_conditions import CauseName, KeptConditions
 
 VERSION = 1
@@ -57,6 +59,7 @@ class KeptMore(Schema):
     """What else is kept."""
 
     conditions: KeptConditions = KeptConditions()
+    days: Many[OperationDay] = ()
     alarms: dict[CauseName, KeptAlarm] = Field(default_factory=dict)
 
 
@@ -104,6 +107,20 @@ def read_record(path: Path, valve: str, scales: Scales) -> KeptHealth:
         return KeptHealth(record, more=more)
     dropped = f"{others[0]}; it was {record.baseline_pa:.7g} Pa"
     return KeptHealth(replace(record, baseline_pa=None), rescaled=dropped, more=more)
+
+
+def kept_days(path: Path, valve: str) -> tuple[OperationDay, ...]:
+    """Return the days that are kept of a valve, oldest first; none where no file is there. Changes nothing.
+
+    Raises:
+        InputError: the file cannot be read.
+    """
+    try:
+        return _parsed(path.read_bytes(), valve)[2].days
+    except FileNotFoundError:
+        return ()
+    except (OSError, _Unreadable) as error:
+        raise InputError(str(path), f"the health record cannot be read: {error}") from None
 
 
 def write_record(path: Path, valve: str, record: HealthRecord, scales: Scales, more: KeptMore = NOTHING_MORE) -> None:

@@ -59,7 +59,7 @@ class StoredHealth:
         try:
             folder.mkdir(parents=True, exist_ok=True)
             kept = read_record(path, valve, scales)
-            write_record(path, valve, kept.record, scales)
+            write_record(path, valve, kept.record, scales, kept.more)
         except OSError as error:
             raise InputError(str(path), f"the health record cannot be kept there: {error.strerror}") from None
         return cls(path, scales, kept)
@@ -82,6 +82,7 @@ class HealthKeeper:
         self._alarms = alarms or AlarmList()
         if stored is not None:
             health.watch.begin(stored.kept.more.conditions)
+            health.operation.begin(stored.kept.more.days)
             self._alarms.begin(
                 {Ne107Cause[name]: Alarm(**dict(each)) for name, each in stored.kept.more.alarms.items()}
             )
@@ -148,7 +149,7 @@ class HealthKeeper:
         kept = {
             cause.name: KeptAlarm(**each._asdict()) for cause, each in self._alarms.alarms.items() if each != Alarm()
         }
-        return KeptMore(conditions=self._health.watch.kept, alarms=kept)
+        return KeptMore(conditions=self._health.watch.kept, alarms=kept, days=self._health.operation.days)
 
 
 def _say_of(stored: StoredHealth) -> None:

@@ -15,6 +15,10 @@ before the noise is known. A moving stem raises it little at the rates of a bus;
 that noise above 0.4 % of the stroke does count.
 """
 
+from bisect import bisect_right
+
+SPANS = (0.01, 0.02, 0.05, 0.1, 0.2, 0.5, 0.9)
+"""Upper edges of how far the stem goes from one turn to the next, shares of the stroke; the last bin is beyond."""
 STEP = 1.02
 """By how much one sample changes the median followed."""
 SIGMAS = 12.0
@@ -37,6 +41,9 @@ class TravelAccumulator:
         self._median_m = self._largest_m / _BAND_PER_MEDIAN
         self._last_m = self._one_before_m = self._point_m = 0.0
         self._direction = 0
+        self._span_m = 0.0
+        self.spans = [0] * (len(SPANS) + 1)
+        self._stroke_m = stroke_m
         self._seen = 0
 
     @property
@@ -71,6 +78,10 @@ class TravelAccumulator:
             return
         direction = 1 if moved_m > 0 else -1
         self.travel_m += abs(moved_m)
-        self.reversals += direction == -self._direction
+        if direction == -self._direction:
+            self.reversals += 1
+            self.spans[bisect_right(SPANS, self._span_m / self._stroke_m)] += 1
+            self._span_m = 0.0
+        self._span_m += abs(moved_m)
         self._direction = direction
         self._point_m = position_m

@@ -22,6 +22,7 @@ from positioner.control.requests import Requests
 from positioner.control.sample import Sample
 from positioner.control.travel.cutoffs import WITHIN, sent_to_m
 from positioner.daemon.health.health_file import HealthRecord
+from positioner.daemon.health.operation import Operation, Turned
 from positioner.daemon.health.packing_tests import FoundFriction, PackingLimits
 from positioner.daemon.health.stiction_index import StictionIndex
 from positioner.daemon.health.travel_accumulator import TravelAccumulator
@@ -50,11 +51,14 @@ class HealthSettings:
     """Of what table `[alarms]` names."""
     alarms: AlarmsTable
     travel: Travel
+    range_pa: tuple[float, float]
+    """Of the commands."""
 
     @classmethod
     def of_file(cls, file: DaemonFile) -> "HealthSettings":
         """Return the settings that a daemon's file asks for."""
-        return cls.of(file.health, file.valve.stroke_m, file.supervision, file.alarms, file.valve.travel)
+        range_pa = (file.pressure.minimum_pa, file.pressure.maximum_pa)
+        return cls.of(file.health, file.valve.stroke_m, file.supervision, file.alarms, file.valve.travel, range_pa)
 
     @classmethod
     def of(
@@ -64,6 +68,7 @@ class HealthSettings:
         supervision: SupervisionTable = MONITORS,
         alarms: AlarmsTable = ALARMS,
         travel: Travel | None = None,
+        range_pa: tuple[float, float] = (0.0, 420e3),
     ) -> "HealthSettings":
         """Return the settings that these tables ask for, for a valve of that stroke."""
         return cls(
@@ -90,6 +95,7 @@ class HealthSettings:
             cause_classes={CLASSED[name]: _class(letter) for name, letter in alarms.ne107.items()},
             alarms=alarms,
             travel=travel or Travel(stroke_m),
+            range_pa=range_pa,
         )
 
     @property
@@ -130,7 +136,10 @@ class Health:
         self.conditions: frozenset[Ne107Cause] = frozenset()
         """What holds of what is looked at once a second; replaced whole by the thread that does."""
         self.watch = ValveConditions(settings.packing, settings.alarms, settings.travel)
+        self.operation = Operation(settings.travel, settings.range_pa)
         self._found: FoundFriction | None = None
+        self._command_pa = inf
+        self._falls_pa = 0.0
         self._stood = (nan, nan, inf)
         """Where, for which reference, and since when: m, m, s."""
 
@@ -163,6 +172,10 @@ class Health:
 
     def enter(self, sample: Sample, decision: Decision, requests: Requests) -> None:
         """Take one cycle."""
+        command_pa = decision.command_pa
+        if command_pa < self._command_pa < inf:
+            self._falls_pa += self._command_pa - command_pa
+        self._command_pa = command_pa
         if decision.applied is not self._applied:
             self._take(decision)
         if requests is not self._requests:
@@ -193,6 +206,7 @@ class Health:
         stiction = self._stiction
         packing = PackingFigures(self._found, self._baseline_pa, stiction.counted, stiction.index)
         self.conditions = self.watch.look(sample, decision, packing, wall_s)
+        self.operation.look(sample, decision, Turned(tuple(self._travel.spans), self._falls_pa), wall_s)
 
     def _take(self, decision: Decision) -> None:
         before, self._applied = self._applied, decision.applied
