@@ -66,7 +66,8 @@ def _print_day(day: "OperationDay") -> None:
     """Print a day: a line, and its histograms."""
     import datetime
 
-    from positioner.daemon.health.operation import DAY_S, DEVIATIONS, OPENINGS, SPANS
+    from positioner.daemon.health.operation import DAY_S, DEVIATIONS, OPENINGS
+    from positioner.daemon.health.travel_accumulator import SPANS
 
     date = datetime.datetime.fromtimestamp(day.day * DAY_S, datetime.UTC).date()
     print(f"\n{date}  {day.seconds / 3600:.1f} h, {day.exhausted:.3g} volumes of air, {day.saturated} s at a limit")

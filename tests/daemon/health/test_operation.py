@@ -64,12 +64,12 @@ def test_a_command_at_its_limit_a_leak_a_poor_supply_and_a_stem_beside_its_cours
         operation.look(seen, now, NOT_TURNED, 0.0)
     today = operation.today
     assert (today.short.value, today.short_high.value) == pytest.approx((0.02, 0.15))
-    assert (today.course.count, today.course.total) == (2, pytest.approx((0.19 - 0.06 - 0.02) / STROKE_M))
+    assert (today.course.count, today.course.total) == pytest.approx((2, (0.19 - 0.06 - 0.02) / STROKE_M))
     operation.look(sample, decision._replace(command_pa=199.5e3), NOT_TURNED, 0.0)
     assert operation.today.saturated == 1
     turned = Turned((1, *NOT_TURNED.spans[1:]), 2 * 101_325.0)
     operation.look(sample, decision, turned, 0.0)
-    assert (operation.today.span[0], operation.today.exhausted) == (1, pytest.approx(2.0))
+    assert (operation.today.span[0], operation.today.exhausted) == pytest.approx((1, 2.0))
 
 
 def test_spans_go_from_turn_to_turn() -> None:
