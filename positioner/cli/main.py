@@ -29,6 +29,7 @@ COMMANDS = (
     "pst",
     "cst",
     "steps",
+    "report",
     "discriminate",
     "map",
     "health",

@@ -13,5 +13,6 @@ registers, a cycle of the command's own, or virtual time. It needs numpy alone.
     small_steps                     dead band, resolution and step response, by small steps
     commissioning                   from commands and a reading alone to what a daemon's file needs
     outcome                         figures, verdicts by their codes, picture; how they show themselves
+    as_found_report                 as found and as left of a valve, as HTML or PDF
     kept_records                    as found, as left, factory: kept, and what has changed since
 """

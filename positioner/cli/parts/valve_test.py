@@ -224,8 +224,12 @@ def kept(outcome: "Outcome", file: "DaemonFile", arguments: argparse.Namespace, 
 
     from positioner.tests_on_the_valve.kept_records import keep
 
-    tables = file.model_dump(mode="json", include={"valve", "device", "pressure", "experiment", "law", "control"})
-    return keep(records_folder(file, arguments.config), outcome, kind, time.time(), tables)
+    return keep(records_folder(file, arguments.config), outcome, kind, time.time(), configured(file))
+
+
+def configured(file: "DaemonFile") -> dict[str, Any]:
+    """Return what of a daemon's file is kept with a record: tables by name."""
+    return file.model_dump(mode="json", include={"valve", "device", "pressure", "experiment", "law", "control"})
 
 
 def draw(outcome: "Outcome", path: Path) -> None:

@@ -1,0 +1,267 @@
+"""The report of a valve, as found and as left: one HTML file that fetches nothing, or a PDF, from the records kept.
+
+    device and configuration        of the newest record
+    a table a test                  each figure recommended, as found, as left, and factory's, each with its +-
+    what has changed                from as found to as left, and since the factory, by how many deviations
+    pictures                        as found and as left, drawn into one
+    signed                          who tested, who accepted
+
+What is recommended is what the daemon's file says, or who asks for the report. A PDF needs matplotlib.
+"""
+
+from collections.abc import Iterator, Mapping, Sequence
+from dataclasses import dataclass, field
+from datetime import UTC, datetime
+from html import escape
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+
+from config.results.block import Table, as_text
+from positioner.tests_on_the_valve.kept_records import KINDS, Record, change_table, changes
+from positioner.tests_on_the_valve.outcome import Curve, Picture, Quantity
+
+if TYPE_CHECKING:
+    from pathlib import Path
+
+TITLES = {"factory": "factory", "as_found": "as found", "as_left": "as left"}
+WIDTH, HEIGHT, EDGE = 640, 300, 46
+"""Of a picture, in its own units."""
+INKS = {"as_found": ("#d9622b", "#e8a27f"), "as_left": ("#1b7f79", "#7db8b4"), "factory": ("#5b6675", "#9aa4b1")}
+SIGNED = ("tested by", "date", "signature", "accepted by", "date", "signature")
+STYLE = """
+:root { --ink: #1f2a37; --quiet: #5b6675; --line: #dfe3e8; --good: #1b7f5c; --bad: #b4491b; }
+body { margin: 0 auto; max-width: 980px; padding: 28px; color: var(--ink); font: 15px/1.5 system-ui, sans-serif; }
+h1 { font-size: 1.6rem; margin: 0 0 .2em; }
+h2 { font-size: 1.15rem; margin: 2em 0 .3em; border-top: 1px solid var(--line); padding-top: .7em; }
+.quiet { color: var(--quiet); font-size: .9rem; }
+table { border-collapse: collapse; width: 100%; font-size: .9rem; font-variant-numeric: tabular-nums; margin: .6em 0; }
+th, td { padding: 5px 10px; border-bottom: 1px solid var(--line); text-align: right; vertical-align: top; }
+th:first-child, td:first-child { text-align: left; } th { color: var(--quiet); font-weight: 600; }
+td.good { color: var(--good); } td.bad { color: var(--bad); font-weight: 600; } svg { max-width: 100%; height: auto; }
+dl { display: grid; grid-template-columns: repeat(3, 1fr); gap: 30px 20px; margin-top: 2em; }
+dt { border-top: 1px solid var(--ink); color: var(--quiet); font-size: .85rem; padding-top: 4px; margin-top: 40px; }
+pre { font-size: .82rem; border: 1px solid var(--line); padding: 8px; overflow-x: auto; }
+@media print { body { padding: 0; } section { break-inside: avoid; } }
+"""
+
+
+@dataclass(frozen=True, slots=True)
+class ValveReport:
+    """What is reported of a valve.
+
+    Attributes:
+        valve: its name.
+        records: all that are kept, oldest first.
+        recommended: what figures should be, by name, SI.
+        configuration: of the newest record, tables by name.
+    """
+
+    valve: str
+    records: Sequence[Record]
+    recommended: Mapping[str, float] = field(default_factory=dict)
+
+    @property
+    def configuration(self) -> Mapping[str, Any]:
+        """What was configured when the newest record was kept."""
+        return self.records[-1].configuration if self.records else {}
+
+    def tests(self) -> list[str]:
+        """Return the tests of which a record is kept as something, in the order they were first kept."""
+        return list(dict.fromkeys(each.outcome.test for each in self.records if each.kind in KINDS))
+
+    def newest(self, test: str, kind: str) -> Record | None:
+        """Return the newest record of a test that is kept as a kind."""
+        found = [each for each in self.records if (each.outcome.test, each.kind) == (test, kind)]
+        return found[-1] if found else None
+
+    def kept(self, test: str) -> dict[str, Record]:
+        """Return the newest record of each kind, of a test."""
+        return {kind: each for kind in ("as_found", "as_left", "factory") if (each := self.newest(test, kind))}
+
+    def table(self, test: str) -> Table:
+        """Return a test's figures: what each should be, and what it was, by kind."""
+        kept = self.kept(test)
+        by_kind = {kind: {each.name: each for each in record.outcome.quantities} for kind, record in kept.items()}
+        names = list(dict.fromkeys(name for told in by_kind.values() for name in told))
+        rows = []
+        for name in names:
+            told = [figures.get(name) for figures in by_kind.values()]
+            first = next(each for each in told if each is not None)
+            rows.append((first.text, self._recommended(first), *(each.shown if each else "-" for each in told)))
+        verdicts = ("verdict", "", *(record.outcome.said for record in kept.values()))
+        return Table(("figure", "recommended ", *(f"{TITLES[kind]} " for kind in kept)), [verdicts, *rows], test)
+
+    def changed(self, test: str) -> list[Table]:
+        """Return what changed from as found to as left, and to as left since the factory."""
+        kept = self.kept(test)
+        told = []
+        for before, after in (("as_found", "as_left"), ("factory", "as_left"), ("factory", "as_found")):
+            if before in kept and after in kept and (after == "as_left" or "as_left" not in kept):
+                table = change_table(changes(kept[after].outcome, kept[before].outcome), kept[before].told)
+                if table.rows:
+                    told.append(table)
+        return told
+
+    def _recommended(self, quantity: Quantity) -> str:
+        value = self.recommended.get(quantity.name, quantity.expected)
+        if value is None:
+            return ""
+        return Quantity(quantity.name, "", quantity.unit, quantity.figure, value).shown_expected
+
+
+def recommended_by(configuration: Mapping[str, Any]) -> dict[str, float]:
+    """Return what the daemon's file says that figures should be, by name."""
+    valve, law = configuration.get("valve") or {}, configuration.get("law") or {}
+    told: dict[str, float] = {}
+    if stroke_m := valve.get("stroke_m"):
+        told["travel_m"] = float(stroke_m)
+    slope, friction = law.get("b_over_c_pa_per_m"), law.get("k_over_c_pa")
+    if slope and friction:
+        offset = float(law.get("offset_pa") or 0.0)
+        told |= {"spring_pa_per_m": -float(slope), "friction_pa": -float(friction), "bench_low_pa": offset}
+        if stroke_m:
+            told["bench_high_pa"] = offset - float(slope) * float(stroke_m)
+    return told
+
+
+def as_html(report: ValveReport) -> str:
+    """Return the report as one page."""
+    now = datetime.now(UTC)
+    title = f"Valve {report.valve}: as found and as left"
+    parts = [
+        f"<h1>{escape(title)}</h1><p class='quiet'>written {now:%Y-%m-%d %H:%M} UTC; every ± is two standard deviations"
+        " or half a bracket; what cannot be determined says why</p>",
+        *(_section(report, each) for each in report.tests()),
+        f"<section><h2>Configuration</h2>{_configuration(report)}</section>",
+        "<section><h2>Signed</h2><dl>" + "".join(f"<div><dt>{each}</dt></div>" for each in SIGNED) + "</dl></section>",
+    ]
+    if not report.tests():
+        parts.insert(1, "<p>No record is kept as found, as left or as the factory's: nothing to report.</p>")
+    csp = "default-src 'none'; style-src 'unsafe-inline'"
+    return (
+        f'<!DOCTYPE html>\n<html lang="en"><head><meta charset="utf-8"><title>{escape(title)}</title>'
+        f'<meta http-equiv="Content-Security-Policy" content="{csp}"><style>{STYLE}</style></head>\n<body>\n'
+        + "\n".join(parts)
+        + "\n</body></html>\n"
+    )
+
+
+def write_pdf(report: ValveReport, path: "Path") -> None:
+    """Write the report as a PDF, a page for each table and picture.
+
+    Raises:
+        ModuleNotFoundError: matplotlib is not installed (extra `plot`).
+    """
+    from config.extras import needed
+
+    figures, pages = needed("matplotlib.figure", "report"), needed("matplotlib.backends.backend_pdf", "report")
+    with pages.PdfPages(path) as pdf:
+        for test in report.tests():
+            texts = [as_text([report.table(test)]), *(as_text([each]) for each in report.changed(test))]
+            _page(figures, pdf, f"Valve {report.valve}: {test}", "\n\n".join(texts))
+            pictures = [
+                (kind, each.outcome.picture) for kind, each in report.kept(test).items() if each.outcome.picture
+            ]
+            if pictures:
+                figure = figures.Figure(figsize=(11.7, 8.3), layout="constrained")
+                for axes, (kind, picture) in zip(
+                    figure.subplots(len(pictures), 1, squeeze=False)[:, 0], pictures, strict=True
+                ):
+                    picture.draw(axes)
+                    axes.set_title(TITLES[kind])
+                pdf.savefig(figure)
+        _page(
+            figures,
+            pdf,
+            f"Valve {report.valve}",
+            _lines(report.configuration) + "\n\n\n" + "\n\n\n".join(f"{each}: {'_' * 40}" for each in SIGNED),
+        )
+
+
+def _page(figures: Any, pdf: Any, title: str, text: str) -> None:
+    figure = figures.Figure(figsize=(11.7, 8.3))
+    figure.text(0.04, 0.95, title, fontsize=13, weight="bold", va="top")
+    widest = max((len(each) for each in text.splitlines()), default=1)
+    size = min(8.0, 1150.0 / max(widest, 1), 480.0 / max(1, text.count("\n") + 1) * 1.1)
+    figure.text(0.04, 0.90, text, fontsize=size, family="monospace", va="top")
+    pdf.savefig(figure)
+
+
+def _section(report: ValveReport, test: str) -> str:
+    when = "; ".join(each.told for each in report.kept(test).values())
+    notes = dict.fromkeys(note for each in report.kept(test).values() for note in each.outcome.notes)
+    return (
+        f"<section><h2>{escape(test.capitalize())}</h2><p class='quiet'>{escape(when)}</p>"
+        + _html_table(report.table(test))
+        + "".join(f"<p><b>{escape(each.title)}</b></p>{_html_table(each)}" for each in report.changed(test))
+        + _svg({kind: each.outcome.picture for kind, each in report.kept(test).items()})
+        + "".join(f"<p class='quiet'>{escape(each)}</p>" for each in notes)
+        + "</section>"
+    )
+
+
+def _html_table(table: Table) -> str:
+    head = "".join(f"<th>{escape(each.strip())}</th>" for each in table.headings)
+    rows = "".join("<tr>" + "".join(f"<td>{escape(cell)}</td>" for cell in row) + "</tr>" for row in table.rows)
+    return f"<table><thead><tr>{head}</tr></thead><tbody>{rows}</tbody></table>"
+
+
+def _configuration(report: ValveReport) -> str:
+    return f"<pre>{escape(_lines(report.configuration))}</pre>"
+
+
+def _lines(configuration: Mapping[str, Any]) -> str:
+    told = []
+    for name, table in configuration.items():
+        if isinstance(table, Mapping):
+            told += [
+                f"[{name}]",
+                *(f"{key} = {value}" for key, value in table.items() if not isinstance(value, Mapping)),
+            ]
+    return "\n".join(told)
+
+
+def _svg(pictures: Mapping[str, Picture | None]) -> str:
+    """Return the pictures of one test drawn into one, a colour for each kind."""
+    drawn = [(kind, curve) for kind, each in pictures.items() if each is not None for curve in each.curves]
+    drawn = [(kind, curve) for kind, curve in drawn if len(curve.x)]
+    if not drawn:
+        return ""
+    axes = next(each for each in pictures.values() if each is not None)
+    xs, ys = (np.concatenate([getattr(curve, name) for _, curve in drawn]) for name in ("x", "y"))
+    left, right, low, high = float(xs.min()), float(xs.max()), float(ys.min()), float(ys.max())
+    across = (WIDTH - 2 * EDGE) / ((right - left) or 1.0)
+    up = (HEIGHT - 2 * EDGE) / ((high - low) or 1.0)
+
+    def at(curve: Curve) -> Iterator[str]:
+        for x, y in zip(curve.x.tolist(), curve.y.tolist(), strict=True):
+            yield f"{EDGE + (x - left) * across:.1f},{HEIGHT - EDGE - (y - low) * up:.1f}"
+
+    shapes, seen = [], dict.fromkeys(kind for kind, _ in drawn)
+    for kind, curve in drawn:
+        ink = INKS[kind][1 if curve.points else 0]
+        if curve.points:
+            dots = "".join(f'<circle cx="{x}" cy="{y}" r="1.2"/>' for x, y in (each.split(",") for each in at(curve)))
+            shapes.append(f'<g fill="{ink}">{dots}</g>')
+        else:
+            shapes.append(f'<polyline fill="none" stroke="{ink}" points="{" ".join(at(curve))}"/>')
+    words = [
+        f'<text x="{WIDTH / 2}" y="{HEIGHT - 8}" text-anchor="middle">{escape(axes.x)}</text>',
+        f'<text x="14" y="{HEIGHT / 2}" text-anchor="middle" transform="rotate(-90 14 {HEIGHT / 2})">'
+        f"{escape(axes.y)}</text>",
+        f'<text x="{EDGE}" y="{HEIGHT - EDGE + 16}">{left:.4g}</text>',
+        f'<text x="{WIDTH - EDGE}" y="{HEIGHT - EDGE + 16}" text-anchor="end">{right:.4g}</text>',
+        f'<text x="{EDGE - 4}" y="{HEIGHT - EDGE}" text-anchor="end">{low:.4g}</text>',
+        f'<text x="{EDGE - 4}" y="{EDGE + 4}" text-anchor="end">{high:.4g}</text>',
+        *(
+            f'<text x="{EDGE + 130 * number}" y="20" fill="{INKS[kind][0]}">{TITLES[kind]}</text>'
+            for number, kind in enumerate(seen)
+        ),
+    ]
+    size = f'width="{WIDTH - 2 * EDGE}" height="{HEIGHT - 2 * EDGE}"'
+    frame = f'<rect x="{EDGE}" y="{EDGE}" {size} fill="none" stroke="#dfe3e8"/>'
+    return (
+        f'<svg viewBox="0 0 {WIDTH} {HEIGHT}" width="{WIDTH}" font-size="11" font-family="system-ui, sans-serif">'
+        f"{frame}{''.join(shapes)}{''.join(words)}</svg>"
+    )

@@ -1,0 +1,146 @@
+"""The report as found and as left: every column that tables of plants have, with its +-; what changed; its pictures."""
+
+import re
+from collections.abc import Iterator
+from contextlib import contextmanager
+from html.parser import HTMLParser
+from pathlib import Path
+
+import pytest
+
+from config.codes import ValveTestVerdict
+from positioner.cli.main import main
+from positioner.response.figure import Figure
+from positioner.tests_on_the_valve.as_found_report import ValveReport, as_html, recommended_by
+from positioner.tests_on_the_valve.kept_records import folder_of, keep, records
+from positioner.tests_on_the_valve.outcome import Outcome, Quantity
+from positioner.tests_on_the_valve.signature import signature
+from tests.tests_on_the_valve.test_signature import PLATE, TIGHT, recorded
+from tests.tests_on_the_valve.virtual_valve import STROKE_M, told
+
+WORN = told(coulomb_n=800.0, static_n=880.0)
+STROKES = Outcome(
+    "commissioning",
+    "FV-1",
+    (
+        Quantity("opening_s", "opens within", "s", Figure(1.1, 0.05)),
+        Quantity("closing_s", "closes within", "s", Figure(None, None, "longer than the 6 s that were <waited>")),
+    ),
+    (ValveTestVerdict.PASSED,),
+)
+LAW = {"b_over_c_pa_per_m": -2e6, "k_over_c_pa": -6000.0, "offset_pa": 20e3}
+CONFIGURATION = {"valve": {"name": "FV-1", "stroke_m": STROKE_M}, "law": LAW}
+SITE = f"[valve]\nname = 'FV-1'\nstroke_m = {STROKE_M}\n[law]\nb_over_c_pa_per_m = -2e6\nk_over_c_pa = -6000.0\n"
+
+
+@pytest.fixture(scope="module")
+def site(tmp_path_factory: pytest.TempPathFactory) -> Path:
+    folder = tmp_path_factory.mktemp("site")
+    (folder / "site.toml").write_text(SITE)
+    kept = folder_of(folder, "FV-1")
+    keep(kept, signature(recorded(WORN), PLATE), "as_found", 1e9, CONFIGURATION)
+    keep(kept, signature(recorded(TIGHT, seed=1), PLATE), "as_left", 2e9, CONFIGURATION)
+    keep(kept, STROKES, "as_left", 3e9, CONFIGURATION)
+    return folder / "site.toml"
+
+
+class Page(HTMLParser):
+    """Rows of cells, and what is fetched."""
+
+    def __init__(self, text: str) -> None:
+        super().__init__()
+        self.rows: list[list[str]] = []
+        self.fetched: list[str] = []
+        self.feed(text)
+
+    def handle_starttag(self, tag: str, attrs: list[tuple[str, str | None]]) -> None:
+        self.fetched += [value for name, value in attrs if name in ("src", "href") and value]
+        if tag == "tr":
+            self.rows.append([])
+        if tag in ("td", "th"):
+            self.rows[-1].append("")
+
+    def handle_data(self, data: str) -> None:
+        if self.rows and self.rows[-1]:
+            self.rows[-1][-1] += data
+
+
+def test_every_column_that_tables_of_plants_have_is_there_with_its_plus_minus(site: Path, tmp_path: Path) -> None:
+    out = tmp_path / "FV-1.html"
+    assert main(["report", str(site), "-o", str(out), "--recommended", "seat_load_n=1200"]) == 0
+    text = out.read_text()
+    page = Page(text)
+    rows = {row[0]: row for row in reversed(page.rows) if row}  # the first of each name
+    wanted = (
+        "friction",
+        "dynamic error band at the slowest rate, largest",
+        "linearity: farthest from the best line",
+        "seat load",
+        "bench set, lower end",
+        "bench set, upper end",
+        "spring rate",
+    )
+    for name in wanted:
+        assert all("±" in cell for cell in rows[name][2:4]), rows[name]
+    assert rows["figure"] == ["figure", "recommended", "as found", "as left"]
+    assert rows["seat load"][1] == "1200 N"
+    assert rows["opens within"][-1] == "1.1 ± 0.05 s"
+    assert rows["closes within"][-1].startswith("cannot be determined: longer than")
+    assert rows["bench set, upper end"][1] == "80 kPa"
+    assert any("packing loose or worn" in cell for row in page.rows for cell in row)
+    assert page.fetched == []
+    assert "&lt;waited&gt;" in text
+    assert text.count("<svg") == 1
+    assert {"as found", "as left"} <= set(re.findall(r">(as found|as left)</text>", text))
+    for field in ("tested by", "accepted by", "signature"):
+        assert f"<dt>{field}</dt>" in text
+
+
+@pytest.mark.long
+def test_a_pdf_has_a_page_for_each(site: Path, tmp_path: Path) -> None:
+    out = tmp_path / "FV-1.pdf"
+    assert main(["report", str(site), "-o", str(out)]) == 0
+    pages = re.findall(rb"/Type /Page\b", out.read_bytes())
+    assert len(pages) == 4, "signature and its pictures, commissioning, configuration"
+
+
+@contextmanager
+def nothing_kept(folder: Path) -> Iterator[Path]:
+    (folder / "site.toml").write_text(SITE)
+    yield folder / "site.toml"
+
+
+def test_bad_input_is_one_line(site: Path, tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    with nothing_kept(tmp_path) as bare:
+        assert main(["report", str(bare), "-o", str(tmp_path / "out.html")]) == 1
+        assert "nothing is kept in" in capsys.readouterr().err
+    assert main(["report", str(site), "-o", str(tmp_path / "out.docx")]) == 2
+    assert "allowed are .html and .pdf" in capsys.readouterr().err
+    assert main(["report", str(site), "-o", str(tmp_path / "x.html"), "--recommended", "wear=1"]) == 2
+    assert "no figure of that name; there are: " in capsys.readouterr().err
+    broken = folder_of(site.parent, "FV-1") / "29990101_signature.json"
+    broken.write_text("{}")
+    try:
+        assert main(["report", str(site), "-o", str(tmp_path / "x.html")]) == 2
+        assert "is no record of a test on the valve" in capsys.readouterr().err
+    finally:
+        broken.unlink()
+
+
+def test_a_report_of_what_was_found_alone_has_one_column(tmp_path: Path) -> None:
+    keep(tmp_path, STROKES, "as_found", 1e9, {})
+    report = ValveReport("FV-1", records(tmp_path))
+    assert report.table("commissioning").headings == ("figure", "recommended ", "as found ")
+    assert report.changed("commissioning") == []
+    assert "as found and as left" in as_html(report)
+
+
+def test_what_the_file_says_is_recommended() -> None:
+    assert recommended_by(CONFIGURATION) == {
+        "travel_m": STROKE_M,
+        "spring_pa_per_m": 2e6,
+        "friction_pa": 6000.0,
+        "bench_low_pa": 20e3,
+        "bench_high_pa": pytest.approx(100e3),
+    }
+    assert recommended_by({}) == {}
