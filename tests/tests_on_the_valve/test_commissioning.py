@@ -12,6 +12,7 @@ from config.errors import InputError
 from config.slave_file import DeviceFault, Initial
 from config.toml_text import with_values
 from config.travel import ActionWord
+from config.valve_file import EffectTable
 from positioner.cli.main import main
 from positioner.cli.parts.own_valve import unknown_travel
 from positioner.control.settings import Settings
@@ -22,6 +23,7 @@ from tests.tests_on_the_valve.virtual_valve import (
     AREA_M2,
     MAXIMUM_PA,
     MIDWAY,
+    ORDINARY,
     PARAMETERS,
     PRELOAD_N,
     SLOPE,
@@ -33,6 +35,8 @@ from tests.tests_on_the_valve.virtual_valve import (
 
 UNKNOWN = unknown_travel(daemon_file())
 BOUNDS = Settings.of(UNKNOWN).experiment
+OFF_M = 1e-3
+"""The reading's zero."""
 SITE = f"""# FV-1, behind the boiler
 [valve]
 name = "FV-1"     # as the plant calls it
@@ -59,7 +63,9 @@ def written(folder: Path, action: ActionWord, monkeypatch: pytest.MonkeyPatch) -
     site = folder / "site.toml"
     site.write_text(SITE)
     initial = MIDWAY if action == "air_to_open" else Initial()
-    stranger = VirtualValve(file=UNKNOWN, noise=1e-3, action=action, initial=initial)
+    off = EffectTable(name="sensor_offset", offset_m=OFF_M)  # type: ignore[call-arg]
+    valve = ORDINARY.model_copy(update={"effect": (*ORDINARY.effect, off)})
+    stranger = VirtualValve(valve, file=UNKNOWN, noise=1e-3, action=action, initial=initial)
 
     @contextmanager
     def in_memory(_file: DaemonFile, _source: Path) -> Iterator[VirtualValve]:
@@ -85,12 +91,14 @@ def test_a_valve_that_nobody_has_described_runs_after_it(
     assert file.valve.action == action
     assert file.law is not None
     assert file.law.b_over_c_pa_per_m == pytest.approx(-SLOPE, rel=0.01)
-    assert file.law.offset_pa == pytest.approx((PRELOAD_N + 0.12 * 207.5) / AREA_M2, rel=0.02)
+    low_pa = (PRELOAD_N + 0.12 * 207.5) / AREA_M2
+    assert file.law.offset_pa == pytest.approx(low_pa - SLOPE * OFF_M, rel=0.03)
+    assert "its zero is off, set it in the device" in capsys.readouterr().out
     loop = VirtualLoop(file, stranger.device)
     for opening in (0.3, 0.7, 0.65):
         loop.refer_to(file.valve.travel.stem_m(opening) / file.valve.stroke_m, 15.0)
-        stem_m = stranger.device.stem_m
-        assert file.valve.travel.opening(stem_m) == pytest.approx(opening, abs=0.01)
+        reading_m = stranger.device.stem_m + OFF_M
+        assert file.valve.travel.opening(reading_m) == pytest.approx(opening, abs=0.01)
 
 
 def test_where_nobody_agrees_nothing_is_moved_nor_written(
