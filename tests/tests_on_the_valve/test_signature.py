@@ -11,10 +11,13 @@ from config.errors import InputError
 from config.recording import Recording
 from config.valve_file import EffectTable, ValveFile
 from positioner.cli.main import main
+from positioner.control.settings import Settings
 from positioner.tests_on_the_valve.kept_records import baseline, changes, keep, records
 from positioner.tests_on_the_valve.outcome import Outcome
+from positioner.tests_on_the_valve.own_cycle import OwnCycle
 from positioner.tests_on_the_valve.program import Bounds
 from positioner.tests_on_the_valve.signature import Nameplate, programmes, signature
+from tests.control import pneumatic_valve as other
 from tests.simulated import simulated
 from tests.tests_on_the_valve.virtual_valve import (
     AREA_M2,
@@ -26,6 +29,8 @@ from tests.tests_on_the_valve.virtual_valve import (
     PRELOAD_N,
     SLOPE,
     STROKE_M,
+    cycle_of,
+    daemon_file,
     told,
 )
 
@@ -184,3 +189,33 @@ def test_the_command_reads_recordings_and_moves_nothing(tmp_path: Path, capsys: 
     assert main([*words, "--config", str(site), "--keep", "as_left"]) == 0
     assert main([*words, "--config", str(site)]) == 0
     assert "nothing has changed since the as left of" in capsys.readouterr().out
+
+
+@pytest.mark.parametrize("bits", [None, 12], ids=["as it reads", "1 % noise, 12 bits"])
+def test_a_plant_of_other_equations_has_its_own_parameters_found(bits: int | None) -> None:
+    file = daemon_file(cycle={"period_s": other.PERIOD_S}, experiment={"limit_s": 120.0})
+    plant = other.PneumaticValve(lambda actuator_pa: actuator_pa)
+    valve = OwnCycle(cycle_of(file, plant))
+    draw = np.random.default_rng(1)
+    recordings = []
+    for program in programmes(Settings.of(file).experiment, valve.command_pa()):
+        recording = valve.play(program).recording
+        assert recording is not None
+        x = recording.position_m
+        if bits is not None:
+            x = x + draw.normal(0.0, NOISE * other.STROKE_M, len(x))
+            x = np.round(x * 2**bits / other.STROKE_M) * other.STROKE_M / 2**bits
+        recordings.append(Recording(dict(recording.columns) | {"position_m": x}))
+    outcome = signature(recordings, Nameplate("other", other.STROKE_M, other.AREA_M2))
+    assert outcome.verdicts == (ValveTestVerdict.PASSED,)
+    friction_n = outcome.figure("friction_n").value
+    assert friction_n is not None
+    assert 0.97 * other.COULOMB_N < friction_n < 1.03 * 0.5 * (other.COULOMB_N + other.STATIC_N)
+    low_pa = other.PRELOAD_N / other.AREA_M2
+    for name, true, allowed in (
+        ("spring_n_per_m", other.SPRING_N_PER_M, 0.01),
+        ("bench_low_pa", low_pa, 0.02),
+        ("bench_high_pa", low_pa + other.SPRING_N_PER_M * other.STROKE_M / other.AREA_M2, 0.02),
+        ("seat_load_n", other.PRELOAD_N - friction_n, 0.02),
+    ):
+        assert outcome.figure(name).value == pytest.approx(true, rel=allowed), name

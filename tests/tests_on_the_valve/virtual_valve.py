@@ -8,6 +8,7 @@ from config.daemon_file import DaemonFile
 from config.slave_file import Change, DeviceFault, Initial, Sensor, SlaveClock, SlaveFile, Supply
 from config.travel import ActionWord
 from config.valve_file import ValveFile, load_valve, shipped_valve
+from drivers.in_memory import Plant
 from positioner.control.requests import ExperimentRequest, Requests
 from positioner.daemon.cycle import Cycle
 from positioner.tests_on_the_valve.own_cycle import OwnCycle
@@ -77,7 +78,7 @@ class VirtualValve(OwnCycle):
         super().__init__(cycle_of(self.file, self.device))
 
 
-def cycle_of(file: DaemonFile, device: Device) -> Cycle:
+def cycle_of(file: DaemonFile, device: Plant) -> Cycle:
     """Return a cycle in automatic, with consent."""
     experiment = ExperimentRequest(consented=True)
     cycle = virtual_cycle(file, device, Requests(mode=Mode.AUTOMATIC, mode_writes=1, experiment=experiment))
