@@ -222,7 +222,11 @@ class Refusal(Code):
         "the motion does not tell the mass: pressure changes, or samples follow, too slowly; "
         "only b/c and k/c can be known",
     )
-    MODEL_DOES_NOT_FIT = 20, "the motion is not that of the model: the residuals outweigh the sensor's noise"
+    MODEL_DOES_NOT_FIT = (
+        20,
+        "the motion is not that of the model, whether device.sampling is before or after: the residuals outweigh the "
+        "sensor's noise; or the pressure moves between samples (identification.pressure_held)",
+    )
     LANDINGS_TOO_FEW = 21, "too few slides have ended in rest, or all in one direction"
     LANDINGS_NOT_STRAIGHT = 22, "the landings lie on no straight line: spring or friction change over the travel"
     CONTRADICTED_BY_LANDINGS = (
@@ -237,6 +241,14 @@ class Refusal(Code):
     TOO_SLOW = 30, "the stem moves too slowly, or too much as its command does, for its inertia to show: step it"
     NO_BREAKAWAY = 31, "the stem has not been seen to break away from a rest"
     BROKEN_OFF = 29, "S3 was broken off before it was complete: by a fault, another mode, or a stem that did not answer"
+
+
+class Sampling(Code):
+    """When a device samples, as an identification has found it out (`[device] sampling`)."""
+
+    UNKNOWN = 0, "not found out"
+    BEFORE = 1, "before: a reply shows the pressure that has acted until then"
+    AFTER = 2, "after: a reply shows the pressure that acts from then on"
 
 
 class Ne107Status(Code):

@@ -361,6 +361,11 @@ class DaemonFile(Schema):
         return min(exchange_s + self.safety.stale_after_s, self.device.acts_alone_after_s)
 
     @property
+    def samples_after(self) -> bool:
+        """Whether a reply shows the pressure of the command that it answers: in lockstep it has obeyed for a period."""
+        return self.device.sampling == "after" and self.cycle.pace != "device"
+
+    @property
     def by_slides(self) -> bool:
         """Whether S3 excites by a staircase of slides.
 

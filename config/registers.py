@@ -21,6 +21,7 @@ from config.codes import (
     Ne107Status,
     Quality,
     Restored,
+    Sampling,
     ServiceState,
     State,
     listed,
@@ -191,6 +192,7 @@ ESTIMATES = (
     Register("landings", 278, "uint16", "1", "slides that ended in rest, which the static law is taken from"),
     Register("static_residual", 280, "float32", "p.u.", "how far landings lie off the static law, standard deviation"),
     Register("offset_applied", 282, "float32", "Pa", "(up - down) / 2 as the law uses it; 0 in the seed's model"),
+    Register("sampling", 284, "uint16", "1", f"[device] sampling, as the last excitation found it: {listed(Sampling)}"),
 )
 
 JITTER_BOUNDS_S = {

@@ -44,7 +44,7 @@ def run(arguments: argparse.Namespace) -> int:
 
 
 def _report(dcs: "Dcs", problem: str | None) -> int:
-    from config.codes import Refusal
+    from config.codes import Ne107Cause, Refusal, Sampling
     from config.registers import BY_NAME, ESTIMATED
 
     print(f"{'':12} {'estimate':>14} {'std':>12} unit")
@@ -57,7 +57,11 @@ def _report(dcs: "Dcs", problem: str | None) -> int:
     if problem is not None:
         print(f"\nnot applied: {problem}; the law keeps what it had")
         return 1
-    law = dcs.get_all("b_over_c_applied", "k_over_c_applied", "offset_applied")
+    law = dcs.get_all("b_over_c_applied", "k_over_c_applied", "offset_applied", "sampling", "ne107_causes_high")
+    if law["sampling"]:
+        print(f"\n[device] sampling, found out: {Sampling(int(law['sampling'])).text}")
+    if int(law["ne107_causes_high"]) >> (Ne107Cause.ONE_DIRECTION - 17) & 1:
+        print("\none direction is identified: k/c holds there alone until the stem has landed the other way")
     print("\napplied; over a restart [memory] folder in the daemon's file keeps it, or without that:")
     print(f"[law]\nb_over_c_pa_per_m = {law['b_over_c_applied']:.7g}")
     print(f"k_over_c_pa = {law['k_over_c_applied']:.7g}")

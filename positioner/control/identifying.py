@@ -44,6 +44,9 @@ def identify(
     if wanted:
         begins = not memory.identifying or (excitation is not None and memory.excitation is None)
         return True, _learnt(memory, sample, requests, refinement, begins=begins, fresh=fresh)
+    if fresh:
+        at_rest = memory.statics.detector.rest is not None
+        memory.identification.look_on(sample.time_s, sample.position_m, sample.pressure_pa, at_rest=at_rest)
     return False, _tested(memory) if memory.identifying and not by_slides else applied
 
 

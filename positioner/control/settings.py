@@ -4,7 +4,7 @@ from collections.abc import Callable
 from dataclasses import dataclass
 from math import inf, sqrt
 
-from config.codes import Fault
+from config.codes import Fault, Sampling
 from config.daemon_file import DaemonFile, LawTable
 from config.extended_valve import ExtendedValve
 from config.supervision_table import FaultActionName
@@ -88,6 +88,7 @@ class Settings:
                     identification.pressure_noise_std_pa, file.device.pressure_step_pa / sqrt(12.0)
                 ),
                 pressure_held=identification.pressure_held,
+                sampling=Sampling.AFTER if file.samples_after else Sampling.BEFORE,
                 window_s=identification.window_s,
                 minimum_window_s=identification.minimum_window_s,
                 derivative_window_s=identification.derivative_window_s,

@@ -125,6 +125,7 @@ def _log_decision(decision: Decision) -> None:
         identifications=decision.applied.count,
         refusal=decision.applied.last_refusal.name,
         singly=decision.estimates.b.reason.name,
+        sampling=decision.estimates.sampling.name,
         restored=decision.restoration.trust.name,
     )
 

@@ -76,13 +76,12 @@ class LinkSettings:
     def of(cls, file: DaemonFile, tolerance_pa: float) -> "LinkSettings":
         """Return what a daemon's file asks for; `tolerance_pa` is that of a restarted device."""
         lockstep = file.cycle.pace == "device"
-        after = file.device.sampling == "after" and not lockstep
         read_back_s = 0.0 if file.cycle.shadow else file.safety.read_back_s
         return cls(
             longest_unattended_s=file.longest_unattended_s,
             read_back_s=read_back_s,
             read_back_tolerance_pa=tolerance_pa,
-            pressure_is_after=after,
+            pressure_is_after=file.samples_after,
             shadow=file.cycle.shadow,
             in_lockstep=lockstep,
             vented_pa=file.pressure.minimum_pa,

@@ -344,6 +344,7 @@ def _estimate_getters(stroke_m: float) -> dict[str, Getter]:
         "estimate_age": lambda s, _: s.sample.time_s - s.decision.estimates.time_s,
         "b_over_c_applied": lambda s, _: r.b_over_c if (r := s.decision.applied.ratios) else math.nan,
         "k_over_c_applied": lambda s, _: r.k_over_c if (r := s.decision.applied.ratios) else math.nan,
+        "sampling": lambda s, _: s.decision.estimates.sampling,
         "offset_applied": lambda s, _: r.offset_pa if (r := s.decision.applied.ratios) else math.nan,
         "landings": lambda s, _: s.decision.static_law.landings,
         "static_residual": lambda s, _: s.decision.static_law.residual_m / stroke_m,

@@ -4,6 +4,9 @@ The daemon's refinement and `positioner estimate` are this one function. What is
 
 - how the pressure goes between the samples, when nobody says: held (the value at a sample is that of the interval
   before it), held ahead (of the interval after it) or linear; each is fitted and the likeliest taken;
+- when a device samples that holds its pressure: before a command acts, or after (`[device] sampling`). The first sample
+  of a stem that leaves its rest at a jump of the pressure tells. Both are fitted; what is said stands, unless the other
+  is a thousand times likelier. Where they are not told apart, var += max(0, (θ - θ_other)^2 - var_other);
 - whether stamps that jitter are when the samples were taken, or when they arrived of samples taken evenly: the stem
   moves by more than its sensor's noise within a tenth of a period of its jerk. Both are fitted, the likelier taken;
 - a, b, c and k hang on μ = m/k_s, g and q do not. When the standard deviation of ln μ exceeds what is allowed, or more
@@ -28,12 +31,12 @@ their intervals share (`breakaway_force`).
 
 from dataclasses import dataclass, replace
 from functools import reduce
-from math import inf, nan, sqrt
+from math import inf, log, nan, sqrt
 from operator import or_
 
 import numpy as np
 
-from config.codes import Refusal
+from config.codes import Refusal, Sampling
 from config.noise import position_noise_m
 from config.results.result import Brief
 from positioner.estimation.array import Array
@@ -64,6 +67,10 @@ DETECTED_WITHIN = 3
 """Samples after which a stem that left its rest has measurably done so."""
 LARGEST_RESIDUAL = 5e-3
 """Share of the travel above which residuals that are not white are a misfit, whatever noise was measured."""
+DECISIVE = log(1000.0)
+"""Logarithm of how much likelier a fit must be than another."""
+FINEST_M = 1e-12
+"""Of residuals: what is smaller is rounding."""
 AS_WELL = 1.1
 """Ratio of the residuals up to which another model explains a motion as well."""
 APART = 3.0
@@ -84,6 +91,7 @@ class BatchSettings:
         noise_std_m: of the position; None: measured.
         pressure_noise_std_pa: of the pressure.
         pressure_held: held or linear between the samples; None: the likelier.
+        sampling: of a held pressure, as it is said to be; `UNKNOWN`: the pressures are those of the interval before.
         moving_threshold_m_per_s: velocity below which the stem counts as stopped.
         largest_relative_std: up to which an estimate is valid.
     """
@@ -91,6 +99,7 @@ class BatchSettings:
     noise_std_m: float | None = None
     pressure_noise_std_pa: float = 0.0
     pressure_held: bool | None = None
+    sampling: Sampling = Sampling.UNKNOWN
     moving_threshold_m_per_s: float = 1e-3
     largest_relative_std: float = 0.05
 
@@ -103,6 +112,7 @@ class BatchResult(Brief):
         estimates: with standard deviations and reasons.
         fit: behind them; None when nothing could be fitted.
         pressure: how it was taken between the samples: "held", "held ahead" or "linear".
+        sampling: of the device, where that could be told.
         evened: whether the time stamps were taken to jitter about samples taken evenly.
         noise_std_m: of the position, as given or measured; None: unknown.
         segments: how many motions were fitted.
@@ -118,6 +128,7 @@ class BatchResult(Brief):
     segments: int
     left_out: int
     condition: float
+    sampling: Sampling = Sampling.UNKNOWN
 
 
 def identify(
@@ -142,7 +153,7 @@ def identify(
         _fitted(t, x, interpolation, pressures, noise_std_m, settings, prior)
         for interpolation, pressures in _interpolations(u, settings)
     ]
-    best = min(hypotheses, key=_residual_m)
+    best = _likeliest(hypotheses, settings)
     even_s = even_instants(t) if best.fit is not None else None
     if even_s is not None and best.fit is not None:
         again = _fitted(
@@ -153,7 +164,10 @@ def identify(
         reason = _why_nothing(best, x, noise_std_m)
         nothing = no_estimates(reason)
         return BatchResult(nothing, None, best.interpolation, False, noise_std_m, 0, best.segmentation.too_short, nan)
-    estimates = _estimates(best, noise_std_m, settings, float(t[-1]))
+    others = [each.fit for each in hypotheses if each.interpolation != best.interpolation]
+    told_apart = all(_clearly_better(best.fit, each) for each in others)
+    open_std = _open_std(best.fit, others) if settings.sampling else np.zeros(6)
+    estimates = _estimates(best, noise_std_m, settings, float(t[-1]), open_std)
     return BatchResult(
         estimates=replace(estimates, breakaway=_breakaway(best, estimates, settings.largest_relative_std)),
         fit=best.fit,
@@ -163,7 +177,37 @@ def identify(
         segments=len(best.chosen),
         left_out=best.segmentation.too_short + len(best.segmentation.segments) - len(best.chosen),
         condition=condition(best.fit),
+        sampling=_SAMPLING[best.interpolation] if settings.sampling and told_apart else Sampling.UNKNOWN,
     )
+
+
+_SAMPLING = {"held": Sampling.BEFORE, "held ahead": Sampling.AFTER, "linear": Sampling.UNKNOWN}
+
+
+def _likeliest(hypotheses: "list[_Hypothesis]", settings: BatchSettings) -> "_Hypothesis":
+    """Return the likeliest; where something is said of the sampling, that, unless another is clearly better."""
+    best = min(hypotheses, key=_residual_m)
+    said = next((each for each in hypotheses if _SAMPLING[each.interpolation] is settings.sampling), best)
+    stands = settings.sampling and said.fit is not None and not _clearly_better(best.fit, said.fit)
+    return said if stands else best
+
+
+def _clearly_better(one: LikelihoodFit | None, other: LikelihoodFit | None) -> bool:
+    """Return whether a fit is a thousand times likelier than another; residuals that hang together count as fewer."""
+    if one is None or other is None:
+        return one is not None
+    count = one.count / _widening(one)
+    return count * log(max(other.residual_std_m, FINEST_M) / max(one.residual_std_m, FINEST_M)) > DECISIVE
+
+
+def _open_std(fit: LikelihoodFit, others: list[LikelihoodFit | None]) -> Array:
+    """Return by how much θ is open, (6,), where fits that are as likely have another beyond their own deviation."""
+    variance = np.zeros(6)
+    for each in others:
+        if each is not None and not _clearly_better(fit, each):
+            apart = (each.theta - fit.theta) ** 2 - np.abs(np.diag(each.theta_covariance))
+            variance = np.maximum(variance, apart)
+    return np.asarray(np.sqrt(np.maximum(variance, 0.0)))
 
 
 def _why_nothing(best: "_Hypothesis", position_m: Array, noise_std_m: float | None) -> Refusal:
@@ -194,9 +238,11 @@ def even_instants(time_s: Array) -> Array | None:
 
 def _interpolations(pressure_pa: Array, settings: BatchSettings) -> list[tuple[str, Array]]:
     """Return the ways in which the pressure may go between the samples, each with the pressures that say so."""
+    ahead = np.append(pressure_pa[:1], pressure_pa[:-1])
+    if settings.pressure_held and settings.sampling:
+        return [("held", pressure_pa), ("held ahead", ahead)]
     if settings.pressure_held is not None:
         return [("held" if settings.pressure_held else "linear", pressure_pa)]
-    ahead = np.append(pressure_pa[:1], pressure_pa[:-1])
     return [("held", pressure_pa), ("held ahead", ahead), ("linear", pressure_pa)]
 
 
@@ -292,11 +338,13 @@ def condition(fit: LikelihoodFit) -> float:
     return float(sizes[0] / sizes[-1]) if sizes[-1] > 0 else float("inf")
 
 
-def _estimates(best: _Hypothesis, noise_std_m: float | None, settings: BatchSettings, time_s: float) -> Estimates:
+def _estimates(
+    best: _Hypothesis, noise_std_m: float | None, settings: BatchSettings, time_s: float, open_std: Array
+) -> Estimates:
     """Return the estimates of a fit, each valid or with the reason why not."""
     assert best.fit is not None
     fit = _widened(best.fit, settings)
-    values, std = fit.theta.tolist(), np.sqrt(np.abs(np.diag(fit.theta_covariance))).tolist()
+    values, std = fit.theta.tolist(), np.hypot(np.sqrt(np.abs(np.diag(fit.theta_covariance))), open_std).tolist()
     singly = _refusal_of_each(best, fit, settings.largest_relative_std)
     together = Refusal.VALID
     if _does_not_fit(best, noise_std_m, settings):
@@ -326,13 +374,18 @@ def _estimates(best: _Hypothesis, noise_std_m: float | None, settings: BatchSett
 
 def _widened(fit: LikelihoodFit, settings: BatchSettings) -> LikelihoodFit:
     """Return the fit with the covariance that correlated residuals and noise of the pressure leave."""
-    factor = 1.0
-    if fit.correlation > SIGNIFICANT:
-        share = min(fit.correlation / sqrt(fit.count), 0.98)
-        factor = (1 + share) / (1 - share)
+    factor = _widening(fit)
     drive_m = float(fit.p[2]) * settings.pressure_noise_std_pa
     factor *= 1 + (drive_m / max(fit.residual_std_m, 1e-12)) ** 2
     return replace(fit, covariance=fit.covariance * factor)
+
+
+def _widening(fit: LikelihoodFit) -> float:
+    """Return the factor on variances that correlated residuals leave."""
+    if fit.correlation <= SIGNIFICANT:
+        return 1.0
+    share = min(fit.correlation / sqrt(fit.count), 0.98)
+    return (1 + share) / (1 - share)
 
 
 def _refusal_of_each(best: _Hypothesis, fit: LikelihoodFit, largest: float) -> Refusal:

@@ -4,7 +4,7 @@ from dataclasses import dataclass, replace
 from enum import Enum
 from math import nan
 
-from config.codes import Refusal
+from config.codes import Refusal, Sampling
 from config.results.result import Brief
 
 
@@ -63,6 +63,7 @@ class Estimates(Brief):
         time_s: of the last sample used, by the device's clock; NaN when none was.
         breakaway: F_s / A, in Pa; from where the stem broke away, which only a whole record shows.
         directions: in which the stem moved: of the other, k and k/c say nothing.
+        sampling: of the device, as it was found out.
     """
 
     a: Estimate
@@ -75,6 +76,7 @@ class Estimates(Brief):
     time_s: float
     breakaway: Estimate = NO_BREAKAWAY
     directions: Directions = Directions.BOTH
+    sampling: Sampling = Sampling.UNKNOWN
 
     @property
     def law_ready(self) -> bool:

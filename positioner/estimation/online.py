@@ -12,12 +12,13 @@ eta_1 = 1 (`passive`), no excitation will fill a window: each ordinary move goes
 with the posterior of the moves before it as the prior (`passive`).
 """
 
+from collections import deque
 from dataclasses import dataclass, replace
 from math import inf, isfinite, nan
 
 import numpy as np
 
-from config.codes import Refusal
+from config.codes import Refusal, Sampling
 from positioner.estimation.algebraic import Identifier
 from positioner.estimation.batch import BatchResult, BatchSettings
 from positioner.estimation.breakaway_force import after_event, with_validity
@@ -42,6 +43,8 @@ REFINEMENT_TIMEOUT_S = 2.0
 """Time after which a refinement is no longer awaited."""
 MOST_KEPT = 200_000
 """Samples kept for a refinement: a window at the seed's 10 us twice over."""
+REST_BEFORE_S = 0.2
+"""Of the rest before an excitation, that goes out with it: its first sample beyond says when it was taken."""
 MOVE_REST_S = 0.2
 """Of the rest before a move, that goes out with it; and the longest time a move takes, below."""
 MOVE_S = 3.0
@@ -57,6 +60,7 @@ class IdentificationSettings:
         noise_std_m: standard deviation of the position's white noise, resolution / sqrt(12) included; None: measured.
         pressure_noise_std_pa: the same of the pressure. 1 Pa does what A / k_s = 1.2 um would do (the seed's valve).
         pressure_held: see `Identifier`.
+        sampling: of the device, as it is said to be; by that each pressure that is given has acted until its sample.
         window_s: length of motion after which the identification is complete.
         minimum_window_s: length of motion before which nothing is estimated.
         derivative_window_s: length of the derivative filters.
@@ -69,6 +73,7 @@ class IdentificationSettings:
     noise_std_m: float | None = None
     pressure_noise_std_pa: float = 0.0
     pressure_held: bool = True
+    sampling: Sampling = Sampling.BEFORE
     window_s: float = 0.8
     minimum_window_s: float = 0.4
     derivative_window_s: float = 0.05
@@ -101,10 +106,12 @@ class Identification:
         self._refinement: Refinement | None = None
         self._job: RefinementJob | None = None
         self._kept: list[tuple[float, float, float]] = []
+        self._before: deque[tuple[float, float, float]] = deque()  # samples of a stem at rest
         self._awaited_since_s: float | None = None
         self._posterior: MovesPosterior | None = None
         self._broke_away, self._broke_away_s = NO_BREAKAWAY, 0.0
         self._passive = False
+        self._sampling = settings.sampling  # as found out last
         self.moves = 0
         self._rest_in: int | None = None  # samples until a move's rest is long enough
         self._identifier = Identifier(
@@ -133,10 +140,21 @@ class Identification:
         self._clear_record()
         self._noise.restart()
         self._restart_window()
-        self._kept.clear()
+        self._kept = list(self._before)
+        self._before.clear()
         self._awaited_since_s = self._rest_in = None
         self._relative_variance = inf
         self.estimates = no_estimates(Refusal.WAITING_FOR_MOTION)
+
+    def look_on(self, time_s: float, position_m: float, pressure_pa: float, *, at_rest: bool) -> None:
+        """Take a fresh sample while nothing is identified: where the stem rests tells when it leaves."""
+        before = self._before
+        if not at_rest or (before and not 0.0 < time_s - before[-1][0] < REST_BEFORE_S):
+            before.clear()
+        if at_rest and isfinite(position_m) and isfinite(pressure_pa):
+            before.append((time_s, position_m, pressure_pa))
+            while time_s - before[0][0] > REST_BEFORE_S:
+                before.popleft()
 
     def update(
         self,
@@ -213,16 +231,23 @@ class Identification:
     def _hand_out(self, time_s: float) -> None:
         """Let what was kept be fitted; what nobody takes, for a job is under way or nobody is there, is not awaited."""
         settings = self._settings
-        columns = np.array(self._kept).T
+        stamps_s, position_m, shown_pa = np.array(self._kept).T
+        if settings.sampling is Sampling.AFTER:  # they were taken a sample late
+            shown_pa = np.append(shown_pa[1:], shown_pa[-1:])
+        # What an excitation has found out holds for ordinary moves, too.
+        checked = Sampling.UNKNOWN if self._passive else settings.sampling
+        if self._passive and self._sampling is Sampling.AFTER:
+            shown_pa = np.append(shown_pa[:1], shown_pa[:-1])
         asked = BatchSettings(
             noise_std_m=settings.noise_std_m,
             pressure_noise_std_pa=settings.pressure_noise_std_pa,
             pressure_held=settings.pressure_held,
+            sampling=checked,
             moving_threshold_m_per_s=settings.moving_threshold_m_per_s,
             largest_relative_std=settings.largest_relative_std,
         )
         prior = self._posterior.prior(time_s) if self._passive and self._posterior is not None else None
-        self._job = RefinementJob(columns[0], columns[1], columns[2], asked, prior)
+        self._job = RefinementJob(stamps_s, position_m, shown_pa, asked, prior)
         if not self._passive:
             self._awaited_since_s = time_s
         else:
@@ -238,6 +263,9 @@ class Identification:
         refined = result.estimates.only(parameters=parameters, friction=friction)
         if self._passive and self._posterior is not None:
             refined = replace(refined, directions=self._posterior.directions)
+        if not self._passive:
+            refined = replace(refined, sampling=result.sampling)
+            self._sampling = result.sampling or self._settings.sampling
         if refined.acceptable:
             broke_before = self._broke_away if self._passive else NO_BREAKAWAY
             broke_away = after_event(broke_before, refined.breakaway, time_s - self._broke_away_s)
@@ -245,10 +273,12 @@ class Identification:
             self.estimates = replace(refined, breakaway=with_validity(broke_away, self._settings.largest_relative_std))
             self.moves += self._passive
         elif not self._passive:
-            # Of samples that are far from any motion of the model the integrals know nothing either. A loop in real
-            # time, whose commands come into force a little early or late, stays well below.
+            # Of samples that are far from any motion of the model the integrals know nothing either, nor of pressures
+            # that act otherwise than was said. A loop in real time, whose commands come into force a little early or
+            # late, stays well below.
             gross_m = GROSS * self._settings.stroke_m
             refused = result.fit is not None and not fits and result.fit.residual_std_m > gross_m
+            refused = refused or self._sampling is not self._settings.sampling
             self.estimates = refined if refused else replace(self.estimates, progress=1.0)
 
     def _request(self, parameters: bool, friction: bool) -> None:

@@ -17,6 +17,7 @@ from config.codes import (
     Quality,
     Refusal,
     Restored,
+    Sampling,
     ServiceState,
     State,
 )
@@ -32,6 +33,7 @@ CODES: dict[str, type[Code]] = {
     "why": InhibitReason,
     "restored": Restored,
     "refusal": Refusal,
+    "sampling": Sampling,
     "experiment_state": ExperimentState,
     "ne107": Ne107Status,
     "ne107_cause": Ne107Cause,

@@ -16,7 +16,7 @@ if TYPE_CHECKING:
 
 AGEING = 1.3
 """Factor on F_c and F_s."""
-AGES_AT_S = 10.0
+AGES_AT_S = 12.0
 PERIOD_S = 1e-3
 WINDOW_S = 0.8
 """Length of the identification."""

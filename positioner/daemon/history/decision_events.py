@@ -49,7 +49,8 @@ def events_between(before: Decision, after: Decision, classes: FaultClasses) -> 
         yield Happened(EventKind.MODE, _check(after.mode is not Mode.AUTOMATIC), after.mode)
     yield from _excitation(before, after)
     if after.applied.count > before.applied.count:
-        yield Happened(EventKind.IDENTIFIED)
+        found = after.estimates.sampling
+        yield Happened(EventKind.IDENTIFIED, text=f"the device samples {found.text}" if found else "")
     if after.applied.refusals > before.applied.refusals:
         yield Happened(EventKind.NOT_IDENTIFIED, cause=after.applied.last_refusal)
     if (trust := after.restoration.trust) is not before.restoration.trust:
