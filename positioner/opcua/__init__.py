@@ -8,6 +8,7 @@ A process of its own (`positioner opcua`): no client ever touches a cycle's thre
     valve_desk                      what clients write and call, within the rights of their roles
     guarded_session                 sessions: encrypted, of a trusted application, of a user with a password
     application_keys                this server's certificate, and those of the clients that it trusts
+    told_events                     what has happened since the last look, for those who subscribe
     recorded_history                the daemon's history, for those who ask what was
     valve_server                    all of it on a port
 """

@@ -93,7 +93,7 @@ class RecordedHistory(HistoryStorageInterface):  # type: ignore[misc]  # asyncua
         recorded = self._recorded(source_id)
         stretch = _Stretch.between(start, end)
         chosen, further = stretch.cut(await _in_a_thread(_events, recorded, stretch.since_s), nb_values)
-        return [_event(event, source_id, self._event_type) for _, event in chosen], further
+        return [event_of(event, source_id, self._event_type) for _, event in chosen], further
 
     def _recorded(self, node_id: ua.NodeId) -> Recorded:
         if node_id not in self._nodes:
@@ -187,8 +187,9 @@ def _value(time_s: float, value: float, of: ua.VariantType) -> ua.DataValue:
     )
 
 
-def _event(event: Event, source: ua.NodeId, event_type: ua.NodeId) -> UaEvent:
-    made = UaEvent(source)
+def event_of(event: Event, source: ua.NodeId, event_type: ua.NodeId, emitted_by: ua.NodeId | None = None) -> UaEvent:
+    """Return an event as OPC UA has it, of the valve's node; emitted by it where nobody says by which else."""
+    made = UaEvent(source if emitted_by is None else emitted_by)
     severity = SEVERITY[Ne107Status(event.ne107)] if event.ne107 in list(Ne107Status) else max(SEVERITY.values())
     identity = f"{event.valve}:{event.number}".encode()
     fields: dict[str, tuple[Any, ua.VariantType]] = {

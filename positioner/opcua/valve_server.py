@@ -28,11 +28,14 @@ from positioner.opcua.address_space import (
 )
 from positioner.opcua.application_keys import ApplicationKeys
 from positioner.opcua.guarded_session import Door, GuardedServer
-from positioner.opcua.recorded_history import BY_HOUR, BY_IDENTIFICATION, Recorded, RecordedHistory
+from positioner.opcua.recorded_history import BY_HOUR, BY_IDENTIFICATION, Recorded, RecordedHistory, event_of
+from positioner.opcua.told_events import ToldEvents
 from positioner.opcua.valve_desk import ValveDesk
 from positioner.opcua.valve_nodes import IDENTIFICATION, POSITION, SETPOINT, Shown, Why, refused, shown
 
 EVERY_S = 0.25
+SERVER = ua.NodeId(ua.ObjectIds.Server)
+"""Where a client subscribes that wants the events of all valves."""
 SAID_BETTER = ("sending service fault", "Rejected active session")
 """Of what asyncua logs: the session says who was turned away and why."""
 POLICIES = [
@@ -93,7 +96,7 @@ async def _serve(
     door = Door(keys, sign_in, _say)
     server = Server(iserver=GuardedServer(door))
     await server.init()
-    spaces = await _prepared(server, valves, where, keys)
+    spaces, event_type = await _prepared(server, valves, where, keys)
     desks = [_desk(server, door, valve, space) for valve, space in zip(valves, spaces, strict=True)]
     logger.handlers = [_OneLine()]
     try:
@@ -105,7 +108,7 @@ async def _serve(
     assert server.bserver is not None
     ready(server.bserver.port)
     try:
-        await _keep_writing(server, valves, spaces, stop)
+        await _keep_writing(server, valves, spaces, event_type, stop)
     finally:
         for desk in desks:
             await desk.end()
@@ -114,8 +117,8 @@ async def _serve(
 
 async def _prepared(
     server: Server, valves: Sequence[WatchedValve], where: Listening, keys: ApplicationKeys
-) -> list[ValveSpace]:
-    """Prepare the server, up to its start; return the nodes of each valve."""
+) -> tuple[list[ValveSpace], ua.NodeId]:
+    """Prepare the server, up to its start; return the nodes of each valve, and the type of its events."""
     server.name, server.product_uri, server.manufacturer_name = "positioner", OURS, "positioner"
     server.application_type = ua.ApplicationType.Server
     await server.set_application_uri(application_uri())
@@ -129,6 +132,7 @@ async def _prepared(
     spaces = [await add_valve(server, namespaces, event_type, valve.place) for valve in valves]
     recorded: dict[ua.NodeId, Recorded] = {}
     for valve, space in zip(valves, spaces, strict=True):
+        await server.get_node(space.node_id()).set_event_notifier({ua.EventNotifier.SubscribeToEvents})
         if valve.place.history is None:
             continue
         for path in (*BY_HOUR, *BY_IDENTIFICATION):
@@ -137,9 +141,11 @@ async def _prepared(
             for attribute in (ua.AttributeIds.AccessLevel, ua.AttributeIds.UserAccessLevel):
                 await node.set_attr_bit(attribute, ua.AccessLevel.HistoryRead)
         recorded[space.node_id()] = Recorded(valve.place.history, space.name, "", ua.VariantType.Null)
-        await server.get_node(space.node_id()).set_event_notifier({ua.EventNotifier.HistoryRead})
+        await server.get_node(space.node_id()).set_event_notifier(
+            {ua.EventNotifier.SubscribeToEvents, ua.EventNotifier.HistoryRead}
+        )
     server.iserver.history_manager.set_storage(RecordedHistory(recorded, event_type.nodeid))
-    return spaces
+    return spaces, event_type.nodeid
 
 
 def _desk(server: Server, door: Door, valve: WatchedValve, space: ValveSpace) -> ValveDesk:
@@ -166,13 +172,23 @@ def _desk(server: Server, door: Door, valve: WatchedValve, space: ValveSpace) ->
 
 
 async def _keep_writing(
-    server: Server, valves: Sequence[WatchedValve], spaces: Sequence[ValveSpace], stop: asyncio.Event
+    server: Server,
+    valves: Sequence[WatchedValve],
+    spaces: Sequence[ValveSpace],
+    event_type: ua.NodeId,
+    stop: asyncio.Event,
 ) -> None:
-    """Write what has changed into the nodes until told to end."""
+    """Write what has changed into the nodes, and tell subscribers what has happened, until told to end."""
+    told = [ToldEvents(space.name, valve.place.history) for valve, space in zip(valves, spaces, strict=True)]
     before: dict[tuple[str, str], Shown] = {}
     while not stop.is_set():
-        for valve, space in zip(valves, spaces, strict=True):
+        for valve, space, events in zip(valves, spaces, told, strict=True):
             picture = valve.picture()
+            news = await asyncio.to_thread(events.newer, picture.served) if events.has_news(picture.served) else []
+            for event in news:
+                for emitted_by in (space.node_id(), SERVER):
+                    made = event_of(event, space.node_id(), event_type, emitted_by)
+                    await server.iserver.subscription_service.trigger_event(made)
             for each in (*shown(picture), *refused(picture)):
                 if before.get((space.name, each.node)) != each:
                     before[space.name, each.node] = each

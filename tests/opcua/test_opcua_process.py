@@ -18,6 +18,7 @@ from cryptography import x509
 from cryptography.hazmat.primitives.serialization import Encoding
 from cryptography.x509.oid import ExtendedKeyUsageOID
 
+from config.codes import Mode
 from config.role_passwords import set_password
 from positioner.cli.main import main
 from positioner.cli.parts.children import port_in
@@ -162,6 +163,37 @@ def test_an_operator_moves_the_valve_and_identifies_nothing(site: Site) -> None:
     for got in ("141", "'half'"):
         said = f"(operator) set point refused: set point: allowed is 0 to 100 %, got {got}"
         assert any(line.rstrip().endswith(said) for line in site.log()), got
+
+
+@pytest.mark.parametrize("of_the_server", [False, True])
+def test_who_subscribes_is_told_each_event_once_with_kind_cause_and_severity(site: Site, of_the_server: bool) -> None:
+    async def look(valve: Nodes) -> list[Any]:
+        told: asyncio.Queue[Any] = asyncio.Queue()
+
+        class Handler:
+            def event_notification(self, event: Any) -> None:
+                if event.Kind == "MODE":
+                    told.put_nowait(event)
+
+        types = await valve.client.get_node(ua.ObjectIds.BaseEventType).get_children()
+        (kind,) = [each for each in types if (await each.read_browse_name()).Name == "ValveEventType"]
+        subscription = await valve.client.create_subscription(100, Handler())
+        source = valve.client.nodes.server if of_the_server else valve()
+        await subscription.subscribe_events(source, kind)
+        with Dcs("127.0.0.1", site.daemon_port) as dcs:
+            for mode in (Mode.MANUAL, Mode.HOLD):
+                await asyncio.to_thread(dcs.set, "mode", mode)
+                await asyncio.sleep(1.0)
+        return [await asyncio.wait_for(told.get(), 20) for _ in range(2)]
+
+    first, second = site.seen("observer", look)
+    assert [(each.Kind, each.Cause, each.Severity) for each in (first, second)] == [
+        ("MODE", Mode.MANUAL, 400),
+        ("MODE", Mode.HOLD, 400),
+    ]
+    assert second.Number > first.Number
+    assert first.SourceName == "FV-101"
+    assert "mode" in first.Message.Text
 
 
 def test_an_engineer_is_told_why_nothing_is_identified(site: Site) -> None:

@@ -36,6 +36,7 @@ class AlarmList:
     ) -> None:
         self._tell, self._class_of, self._now_s = tell, class_of, now_s
         self._lock = Lock()
+        self._holding: frozenset[Ne107Cause] | None = None
         self._alarms: Mapping[Ne107Cause, Alarm] = dict.fromkeys(ADVICE, Alarm())
 
     @property
@@ -49,7 +50,10 @@ class AlarmList:
 
     def look(self, causes: Collection[Ne107Cause]) -> None:
         """Take which causes hold now."""
-        now_s = self._now_s()
+        holding = frozenset(causes)
+        if holding == self._holding and not any(each.shelved_until_s for each in self._alarms.values()):
+            return
+        self._holding, now_s = holding, self._now_s()
         self._change({cause: partial(Alarm.after, now_s=now_s, holds=cause in causes) for cause in ADVICE})
 
     def acknowledge(self, cause: Ne107Cause) -> None:

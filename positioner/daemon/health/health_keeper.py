@@ -121,7 +121,7 @@ class HealthKeeper:
             )
         self._checks += 1
         record = self._health.record
-        if self._checks % WRITE_EVERY_CHECKS == 0 or self._is_urgent(record):
+        if self._file is not None and (self._checks % WRITE_EVERY_CHECKS == 0 or self._is_urgent(record)):
             self.store(record)
 
     def _is_urgent(self, record: HealthRecord) -> bool:
