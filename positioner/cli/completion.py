@@ -3,7 +3,7 @@
 import argparse
 from pathlib import Path
 
-HELP = "print what a shell reads to complete these commands by the tabulator"
+HELP = "print a shell's completion script for these commands"
 EXAMPLE = "positioner completion bash > positioner.bash; source positioner.bash"
 
 SHELLS = ("bash", "zsh", "tcsh")
@@ -11,7 +11,7 @@ SHELLS = ("bash", "zsh", "tcsh")
 
 def add_arguments(parser: argparse.ArgumentParser) -> None:
     """Declare the command line."""
-    parser.add_argument("shell", choices=SHELLS, help="whose words are printed")
+    parser.add_argument("shell", choices=SHELLS, help="the shell")
 
 
 def run(arguments: argparse.Namespace) -> int:

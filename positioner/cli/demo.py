@@ -166,14 +166,14 @@ class DemoOutcome:
 
 def add_arguments(parser: argparse.ArgumentParser) -> None:
     """Declare the command line."""
-    parser.add_argument("--bus", choices=tuple(BUSES), help="the fieldbus (modbus; of a loop: none, in virtual time)")
-    parser.add_argument("--loop", choices=("flow",), help="in place of steps: does the positioner calm a flow loop?")
+    parser.add_argument("--bus", choices=tuple(BUSES), help="the fieldbus (modbus); with --loop: none, in virtual time")
+    parser.add_argument("--loop", choices=("flow",), help="put each law into a flow loop, in place of the steps")
     parser.add_argument(
         "--hidden",
         action="store_true",
-        help="in place of ageing: a valve with an effect that the daemon finds in its own recording and then knows",
+        help="give the valve an effect, find it in the daemon's recording, and tell it to the law",
     )
-    parser.add_argument("--out", type=Path, metavar="DIR", help="keep picture, recording, configs and logs there")
+    parser.add_argument("--out", type=Path, metavar="DIR", help="keep picture, recordings, configs and logs there")
     parser.add_argument("--json", type=Path, metavar="FILE", help="write the outcome there")
 
 

@@ -28,12 +28,14 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
     """Declare the command line."""
     parser.add_argument("recordings", type=Path, nargs="+", metavar="REC", help="recordings, CSV or Parquet")
     parser.add_argument("--valve", required=True, metavar="VALVE.toml", help="a valve file, or a shipped valve's name")
-    parser.add_argument("--test", type=Path, metavar="REC", help="held out (the last third of the recordings)")
+    parser.add_argument(
+        "--test", type=Path, metavar="REC", help="recording held out, to judge by (the last third of the others)"
+    )
     parser.add_argument(
         "--effects",
         nargs="+",
         metavar="NAME",
-        help="what is tried (all that come with the package); an own effect by its .py file",
+        help="effects to try (the whole library); one of your own by its .py file",
     )
     parser.add_argument("--json", type=Path, metavar="FILE", help="write all numbers as JSON")
     parser.add_argument("--report", type=Path, metavar="FILE.html", help="write a report to be read in a browser")
@@ -41,25 +43,25 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
         "--experiment",
         type=Path,
         metavar="FILE",
-        help="write the input that would tell apart what the recordings do not",
+        help="write the input that tells the remaining effects apart",
     )
     parser.add_argument(
         "-o",
         "--out",
         type=Path,
         metavar="BETTER.toml",
-        help="write the valve with what is missing, or refitted where its parameters alone were off; if that is sure",
+        help="write the extended, or refitted, valve file where the verdict is sure",
     )
     parser.add_argument(
         "--add",
         nargs="+",
         default=[],
         metavar="NAME",
-        help="with -o: write the valve with these effects, whatever was found, refitted from where the searches ended",
+        help="with -o: add these effects, whatever the verdict",
     )
     parser.add_argument("--seed", type=int, default=0, help="of the searches (0)")
     parser.add_argument(
-        "--budget-s", type=float, metavar="S", help="end after so many seconds, as Ctrl-C does, with what is known then"
+        "--budget-s", type=float, metavar="S", help="end after this many seconds, with what is known by then"
     )
     add_pressure_argument(parser)
     add_noise_argument(parser)

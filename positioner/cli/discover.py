@@ -22,7 +22,9 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
     """Declare the command line."""
     parser.add_argument("recordings", type=Path, nargs="+", metavar="REC", help="recordings, CSV or Parquet")
     parser.add_argument("--valve", required=True, metavar="VALVE.toml", help="a valve file, or a shipped valve's name")
-    parser.add_argument("--test", type=Path, metavar="REC", help="held out (the last third of the recordings)")
+    parser.add_argument(
+        "--test", type=Path, metavar="REC", help="recording held out, to judge by (the last third of the others)"
+    )
     parser.add_argument(
         "-o", "--out", type=Path, metavar="FORM.py", help="write the form as an effect's file, which `extend` takes"
     )

@@ -28,8 +28,10 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
     add_config(parser, text="the running daemon's file, with [recorder]")
     parser.add_argument("--rec", type=Path, nargs="+", required=True, metavar="REC", help="recordings, CSV or Parquet")
     parser.add_argument("--valve", required=True, metavar="VALVE.toml", help="a valve file, or a shipped valve's name")
-    parser.add_argument("--test", type=Path, metavar="REC", help="held out (the last third of the recordings)")
-    parser.add_argument("--effects", nargs="+", metavar="NAME", help="what is tried (all that come with the package)")
+    parser.add_argument(
+        "--test", type=Path, metavar="REC", help="recording held out, to judge by (the last third of the others)"
+    )
+    parser.add_argument("--effects", nargs="+", metavar="NAME", help="effects to try (the whole library)")
     add_pressure_argument(parser)
     parser.add_argument("--budget", type=int, default=60, metavar="MOVES", help="moves allowed in all (60)")
     parser.add_argument("--out", type=Path, default=Path("discriminated"), help="where recordings and verdict go")

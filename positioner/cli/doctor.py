@@ -33,7 +33,7 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
         "--nudge-pa",
         type=float,
         metavar="PA",
-        help="command so much more for a moment, to see when the device samples; no daemon may run",
+        help="command this much more for a moment, to find when the device samples; no daemon may run meanwhile",
     )
 
 

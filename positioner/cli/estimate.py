@@ -17,12 +17,12 @@ EXAMPLE = "positioner estimate rec.csv --json estimated.json"
 def add_arguments(parser: argparse.ArgumentParser) -> None:
     """Declare the command line."""
     parser.add_argument("recording", type=Path, metavar="REC", help="a recording, CSV or Parquet")
-    parser.add_argument("--json", type=Path, metavar="FILE", help="write the numbers there")
+    parser.add_argument("--json", type=Path, metavar="FILE", help="write the numbers as JSON")
     parser.add_argument(
         "--noise-m", type=float, metavar="M", help="standard deviation of the position's noise (else measured)"
     )
     parser.add_argument(
-        "--pressure", choices=("held", "linear"), help="how the pressure goes between the samples (else the likelier)"
+        "--pressure", choices=("held", "linear"), help="the pressure between samples: held or linear (the likelier one)"
     )
     add_export_arguments(parser)
 

@@ -9,7 +9,7 @@ if TYPE_CHECKING:
     from workbench.fleet.examination import Examination
     from workbench.fleet.manifest import Entry
 
-HELP = "rank many valves by their recordings; exit status 1 if any deserves a look or of any nothing is known"
+HELP = "rank many valves by their recordings; exit status 1 if one deserves a look, or nothing is known of it"
 EXAMPLE = "positioner fleet plant.csv --out fleet-out --report fleet.html"
 
 
@@ -21,7 +21,7 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
         type=Path,
         default=Path("fleet-out"),
         metavar="FOLDER",
-        help="what was examined, and tables (fleet-out)",
+        help="folder of examinations and tables (fleet-out)",
     )
     parser.add_argument("--scheduler", metavar="tcp://HOST:PORT", help="a Dask scheduler (workers of this machine)")
     parser.add_argument("--workers", type=int, metavar="N", help="how many of these (one a core)")
@@ -34,7 +34,11 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
     )
     parser.add_argument("--report", type=Path, metavar="FILE.html", help="write the ranking as a page")
     parser.add_argument(
-        "--diagnoses", type=int, default=10, metavar="N", help="diagnosis reports behind that page, the gravest (10)"
+        "--diagnoses",
+        type=int,
+        default=10,
+        metavar="N",
+        help="how many diagnosis reports the page links to, the gravest first (10)",
     )
     parser.add_argument("--since", metavar="DATE", help="say what changed of the valves since then")
     parser.add_argument("--picture", type=Path, metavar="FILE.png", help="draw what changed since then")

@@ -5,7 +5,7 @@ from collections.abc import Mapping
 from pathlib import Path
 from typing import Any
 
-HELP = "make recordings of a valve with a hidden effect, the answer sealed; or reveal it"
+HELP = "make recordings of a valve with a hidden effect, and seal the answer; or reveal it"
 EXAMPLE = "positioner hide --seed 7 -o blind && positioner diagnose blind/fit.csv --valve blind/valve.toml"
 
 LEAST_SAMPLES = 1000
@@ -13,7 +13,7 @@ LEAST_SAMPLES = 1000
 
 def add_arguments(parser: argparse.ArgumentParser) -> None:
     """Declare the command line."""
-    parser.add_argument("--seed", type=int, metavar="N", help="of all that is drawn")
+    parser.add_argument("--seed", type=int, metavar="N", help="seed of all that is drawn")
     parser.add_argument(
         "-o", "--out", type=Path, metavar="DIR", help="where fit.csv, test.csv, valve.toml and sealed.json go"
     )

@@ -15,7 +15,7 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
     """Declare the command line."""
     kinds = "CSV, .xlsx, .mat, HDF5, TDMS, MDF4, Parquet"
     parser.add_argument("file", type=Path, metavar="FILE", help=f"an export: {kinds}; or a recording")
-    parser.add_argument("-o", "--out", type=Path, metavar="REC.csv", help="write the recording; nothing else writes")
+    parser.add_argument("-o", "--out", type=Path, metavar="REC.csv", help="write the recording")
     parser.add_argument(
         "--inspect", action="store_true", help="ask what FILE leaves open, and write the mapping to FILE.mapping.toml"
     )

@@ -6,7 +6,7 @@ from pathlib import Path
 from positioner.cli.parts.loop_arguments import add_loop_arguments, read_record
 from positioner.cli.parts.output_files import writable, write_json
 
-HELP = "does a loop's valve stick, from OP, PV and SP alone; exit status 1 where it sticks or cannot be told"
+HELP = "say whether a loop's valve sticks, from OP, PV and SP alone; exit status 1 where it does or cannot be told"
 EXAMPLE = "positioner loop FIC101.csv --report loop.html"
 
 

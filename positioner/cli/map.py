@@ -24,11 +24,9 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
         "--format",
         choices=("md", "csv", "json", *FOR_OTHERS, "eds"),
         default="md",
-        help="md, csv, json: the map; eds: the data sheet of the simulated CANopen device; else a configuration for it",
+        help="md, csv, json: the map; eds: the simulated CANopen device; else: a program's configuration",
     )
-    parser.add_argument(
-        "--config", type=Path, metavar="CONFIG.toml", help="the daemon's file that a configuration is for"
-    )
+    parser.add_argument("--config", type=Path, metavar="CONFIG.toml", help="the daemon's file, for a configuration")
     parser.add_argument("--reasons", action="store_true", help="print what the numbers in *_reason mean instead")
 
 

@@ -6,7 +6,7 @@ from pathlib import Path
 from positioner.cli.parts.config_argument import add_config, config_files
 from positioner.cli.parts.listening_arguments import add_listening
 
-HELP = "serve what daemons measure of themselves and of their valves for Prometheus: /metrics over HTTP"
+HELP = "serve the metrics of daemons and valves to Prometheus: /metrics over HTTP"
 EXAMPLE = "positioner metrics daemon.toml --listen-port 9502"
 
 

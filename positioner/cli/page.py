@@ -33,10 +33,13 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
     parser.add_argument(
         "--set-password", choices=("operator", "engineer"), help="ask for this role's password, keep it in --roles, end"
     )
-    parser.add_argument("--keep", type=Path, metavar="FOLDER", help="keep what is seen of friction over restarts")
+    parser.add_argument("--keep", type=Path, metavar="FOLDER", help="keep the trend of friction over restarts")
     add_listening(parser)
     parser.add_argument(
-        "--password-file", type=Path, metavar="FILE", help="its first line is asked of everybody; other hosts need it"
+        "--password-file",
+        type=Path,
+        metavar="FILE",
+        help="the first line is the password of everybody; needed to listen beyond this machine",
     )
     parser.add_argument("--no-open", action="store_true", help="print the address, open no browser")
 

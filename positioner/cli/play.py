@@ -19,7 +19,7 @@ if TYPE_CHECKING:
     from positioner.daemon.snapshot import Snapshot
     from positioner.virtual.virtual_cycle import Script
 
-HELP = "closed loop in virtual time: identify first, then follow a reference"
+HELP = "run the closed loop in virtual time: identify, then follow a reference"
 EXAMPLE = "positioner play seed --reference reference.csv --noise-m 1e-5 -o run.csv"
 
 IDENTIFY_S = 1.5
@@ -37,7 +37,7 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
         "--extended",
         type=Path,
         metavar="VALVE.toml",
-        help="play twice, without and with the law knowing this valve file, and print what error either leaves",
+        help="play twice, without this valve file and with it known to the law; print both errors",
     )
     parser.add_argument("--period-s", type=float, default=1e-3, help="period of the loop (1e-3)")
     parser.add_argument("--noise-m", type=float, default=0.0, help="white sensor noise, standard deviation (0)")

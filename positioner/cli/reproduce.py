@@ -18,7 +18,7 @@ if TYPE_CHECKING:
     from positioner.paper.formulas import Erratum
     from positioner.paper.noise_table import Cell
 
-HELP = "the seed's figures and claims: as printed, corrected, and under honest noise; takes two minutes"
+HELP = "print the paper's figures and claims: as printed, corrected, and under honest noise; takes two minutes"
 EXAMPLE = "positioner reproduce --out figures --json reproduced.json"
 
 FIELDBUS_PERIOD_S = 1e-3
@@ -29,7 +29,7 @@ OWN_NOISE = 2
 def add_arguments(parser: argparse.ArgumentParser) -> None:
     """Declare the command line."""
     parser.add_argument("--out", type=Path, metavar="DIR", help="draw the figures there")
-    parser.add_argument("--json", type=Path, metavar="FILE", help="write the numbers there")
+    parser.add_argument("--json", type=Path, metavar="FILE", help="write the numbers as JSON")
     parser.add_argument("--seeds", type=int, default=100, help="runs per cell of the noise table (100)")
 
 

@@ -6,7 +6,7 @@ from pathlib import Path
 from positioner.cli.parts.export_arguments import add_export_arguments, read_any
 from positioner.cli.parts.output_files import writable, write_json
 
-HELP = "step-response figures of a recording by their trade names; exit status 1 if it holds no step"
+HELP = "print step-response figures of a recording by their trade names; exit status 1 if it holds no step"
 EXAMPLE = "positioner response rec.csv --json figures.json"
 
 

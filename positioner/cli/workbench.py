@@ -15,7 +15,10 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
     parser.add_argument("--valve", metavar="VALVE.toml", help="a valve file, or a shipped valve's name")
     add_listening(parser)
     parser.add_argument(
-        "--password-file", type=Path, metavar="FILE", help="its first line is asked of everybody; other hosts need it"
+        "--password-file",
+        type=Path,
+        metavar="FILE",
+        help="the first line is the password of everybody; needed to listen beyond this machine",
     )
     parser.add_argument("--no-open", action="store_true", help="print the address, open no browser")
 

@@ -16,7 +16,9 @@ LONGEST_SHOWN = 40
 
 def add_connection(parser: argparse.ArgumentParser) -> None:
     """Declare the options that say where."""
-    parser.add_argument("--config", type=Path, metavar="CONFIG.toml", help="the daemon's file, which says where")
+    parser.add_argument(
+        "--config", type=Path, metavar="CONFIG.toml", help="the daemon's file, which names host and port"
+    )
     parser.add_argument("--valve", metavar="NAME", help="which of that file's valves")
     parser.add_argument("--host", help="the daemon's host (127.0.0.1)")
     parser.add_argument("--port", type=_whole("a port", 1, 65535), help="its supervisory port (5502)")
@@ -26,7 +28,7 @@ def add_connection(parser: argparse.ArgumentParser) -> None:
         nargs=3,
         type=Path,
         metavar=("AUTHORITY.pem", "CERTIFICATE.pem", "KEY"),
-        help="connect with Modbus/TCP Security: who signed for the daemon, and this end's certificate and key",
+        help="connect by Modbus/TCP Security: the authority's certificate, this end's certificate, and its key",
     )
 
 

@@ -21,8 +21,8 @@ LARGE = 50_000_000
 
 def add_export_arguments(parser: argparse.ArgumentParser) -> None:
     """Declare them, and which stretch of a recording is taken."""
-    parser.add_argument("--from-s", type=float, metavar="S", help="leave out what was before, s as in time_s")
-    parser.add_argument("--to-s", type=float, metavar="S", help="leave out what was after")
+    parser.add_argument("--from-s", type=float, metavar="S", help="leave out samples before this time_s")
+    parser.add_argument("--to-s", type=float, metavar="S", help="leave out samples after this time_s")
     export = parser.add_argument_group(
         "exports in place of recordings", "CSV, .xlsx, .mat, Parquet; `positioner import FILE` proposes these words"
     )
@@ -31,11 +31,11 @@ def add_export_arguments(parser: argparse.ArgumentParser) -> None:
         action="append",
         default=[],
         metavar="OURS=THEIRS:UNIT",
-        help="where a column comes from, once for each: time_s=Time position_m=PV:%% command_pa=OUT:bar; -%% from the "
-        "other end; #2 is the second column, Date+Time two",
+        help="our column, theirs and its unit, once for each: time_s=Time position_m=PV:%% command_pa=OUT:bar. "
+        "#2 is the second column, Date+Time joins two, -%% counts from the other end",
     )
     export.add_argument(
-        "--mapping", type=Path, metavar="MAP.toml", help="all of these words from a file; what is typed goes before"
+        "--mapping", type=Path, metavar="MAP.toml", help="take all of these words from a file; typed ones win"
     )
     export.add_argument("--stroke-m", type=_stroke, metavar="M", help="100 %% of a position (the valve file's stroke)")
     export.add_argument(
@@ -43,26 +43,26 @@ def add_export_arguments(parser: argparse.ArgumentParser) -> None:
         type=_pressure,
         nargs=2,
         metavar=("AT0", "AT100"),
-        help="0 %% and 100 %% of a pressure (else 20e3 100e3 is assumed, and told)",
+        help="pressures of 0 %% and 100 %% (20e3 100e3 is assumed, and told)",
     )
     export.add_argument(
-        "--period-s", type=_period, metavar="S", help="between the rows of a file without a time; no time_s then"
+        "--period-s", type=_period, metavar="S", help="time between the rows of a file without a time column"
     )
-    export.add_argument("--decimal", choices=(".", ","), help="the decimal sign (else as the numbers show)")
+    export.add_argument("--decimal", choices=(".", ","), help="the decimal sign (where the numbers leave it open)")
     export.add_argument(
         "--time-format",
         metavar="FORMAT",
-        help='how dates are written, "%%d.%%m.%%Y %%H:%%M:%%S" (else ISO, or seconds)',
+        help='how dates are written, "%%d.%%m.%%Y %%H:%%M:%%S" (ISO and seconds need none)',
     )
     export.add_argument(
         "--status",
         action="append",
         default=[],
         metavar="THEIRS=GOOD,..",
-        help="a column of words; rows of others than these hold no values",
+        help="a column of status words; only rows of these words hold values",
     )
     export.add_argument(
-        "--sheet", metavar="NAME", help="of a workbook, or a group of TDMS or MDF (else the one that has the columns)"
+        "--sheet", metavar="NAME", help="sheet of a workbook, or group of TDMS or MDF (the one that has the columns)"
     )
 
 

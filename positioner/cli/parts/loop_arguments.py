@@ -27,7 +27,7 @@ def add_loop_arguments(parser: argparse.ArgumentParser) -> None:
         metavar=("AT0", "AT100"),
         help="what the file has for 0 %% and 100 %% of OP (0 100)",
     )
-    columns.add_argument("--decimal", choices=(".", ","), help="the decimal sign (else as the numbers show)")
+    columns.add_argument("--decimal", choices=(".", ","), help="the decimal sign (where the numbers leave it open)")
     columns.add_argument("--time-format", metavar="FORMAT", help='how dates are written, "%%d.%%m.%%Y %%H:%%M:%%S"')
 
 
