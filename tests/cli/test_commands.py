@@ -135,7 +135,7 @@ def test_a_gateway_without_the_model_side_is_told_what_is_missing(missing: str, 
     [
         (
             "[valve]\nstroke_m = 0.1\nstrok = 1\n",
-            "valve.strok: unknown key; allowed here: breakaway_pa, name, stroke_m",
+            "valve.strok: unknown key; allowed here: action, actuator, breakaway_pa, name, stroke_m",
         ),
         ("[valve]\nstroke_m = 0\n", "valve.stroke_m: allowed is 1e-09 to 1e+06, got 0"),
         ("[valve]\n", "valve.stroke_m: is required and missing"),

@@ -101,7 +101,10 @@ def test_effects_keep_their_parameters_for_the_model_side(tmp_path: Path) -> Non
 @pytest.mark.parametrize(
     ("text", "said"),
     [
-        ("[valve]\nstroke_mm = 100\n", "valve.stroke_mm: unknown key; allowed here: breakaway_pa, name, stroke_m"),
+        (
+            "[valve]\nstroke_mm = 100\n",
+            "valve.stroke_mm: unknown key; allowed here: action, actuator, breakaway_pa, name, stroke_m",
+        ),
         ("[valve]\nstroke_m = 0.1\n[cycle]\nperiod_s = 1\npace = 'fast'\n", "cycle.pace: Input should be 'real_time'"),
         ("[valve]\nstroke_m = 0.1\n[pressure]\nminimum_pa = 5e5\n", "pressure: minimum_pa must be below maximum_pa"),
         ("[valve]\nstroke_m = 0.1\n[device.map]\nposition_m = {address = 0}\n", "device.map.command_pa: is required"),
