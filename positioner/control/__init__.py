@@ -5,6 +5,7 @@ never reads a clock, sleeps, writes a file or touches a socket, so the same code
 real time.
 
     controller, controller_memory               one step, what it remembers and decides
+    records                                     how a record is made: by name
     settings, requests, sample                  what it is given, once and in each cycle
     identifying                                 when the estimators run, and when what they found is applied
     supervision, states, reference              who commands, S0 to S3, the reference and its last change

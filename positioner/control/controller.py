@@ -27,14 +27,22 @@ from config.codes import (
 )
 from config.quantities import DeviceStatus
 from positioner.control import first_landing, pressure_path
-from positioner.control.controller_memory import ConsumedRequests, ControllerMemory, Decision
+from positioner.control.controller_memory import (
+    ConsumedRequests,
+    ControllerMemory,
+    Decision,
+    consumed_of,
+    decision_of,
+    memory_of,
+)
 from positioner.control.excitation import NOTHING, ActiveExcitation, climbed, excitation_after
 from positioner.control.identifying import estimates_tested, identify
-from positioner.control.laws.boundary import Law, Seen
-from positioner.control.monitors import MonitorMemory, Needs, after_cycle
+from positioner.control.laws.boundary import Law, Seen, seen_of
+from positioner.control.monitors import MonitorMemory, Needs, after_cycle, needs_of
 from positioner.control.played_experiment import PlayedExperiment, Surroundings, experiment_after
 from positioner.control.pressure_clamp import clamped
 from positioner.control.pressure_path import PathMemory, long_held
+from positioner.control.records import by_name
 from positioner.control.reference import Reference
 from positioner.control.requests import Requests
 from positioner.control.rest_band import RestBand, rest_band
@@ -42,7 +50,7 @@ from positioner.control.restoration import Restoration
 from positioner.control.sample import Sample
 from positioner.control.settings import Settings
 from positioner.control.staircase_excitation import Staircase
-from positioner.control.states import Situation, law_inhibit_reason, state_in
+from positioner.control.states import law_inhibit_reason, situation_of, state_in
 from positioner.control.supervision import NO_FAULT, SupervisionMemory, supervise, usable
 from positioner.control.travel.course import OnCourse
 from positioner.control.travel.cutoffs import HIGH, WITHIN, sent_to_m
@@ -129,7 +137,7 @@ def first_memory(settings: Settings, held_pa: float, restored: ValveKnowledge | 
         law = law.restored(restored)
         statics.restore(restored.landings, restored.held, restored.answers)
     supervision, reference = SupervisionMemory(), Reference(0.0)
-    nothing_yet = Decision(
+    nothing_yet = decision_of(
         command_pa=held_pa,
         state=S0,
         mode=supervision.mode,
@@ -149,14 +157,14 @@ def first_memory(settings: Settings, held_pa: float, restored: ValveKnowledge | 
         dead_band_m=settings.dead_band.fixed_m or 0.0,
         one_direction=False,
     )
-    return ControllerMemory(
+    return memory_of(
         last=nothing_yet,
         wanted_pa=held_pa,
         held_pa=held_pa,
         supervision=supervision,
         monitoring=MonitorMemory(),
         reference=reference,
-        consumed=ConsumedRequests(),
+        consumed=consumed_of(),
         excitation=None,
         identifying=False,
         law=law,
@@ -221,7 +229,7 @@ def step(
         applied, law_before = _nothing_known(now, found)
     elif outcome is not None and outcome.landing and not playing:
         applied = memory.statics.corrected(found)
-    situation = Situation(
+    situation = situation_of(
         automatic=mode is AUTOMATIC,
         exciting=playing or exciting,
         law_ready=applied.ratios is not None and not (excitation is not None and excitation.unanswered),
@@ -258,7 +266,7 @@ def step(
         or (InhibitReason.RESTORED_WAITS if waits else law_inhibit_reason(situation))
         or (by_law if settings.minimum_pa <= asked_pa <= settings.maximum_pa else InhibitReason.LAW_BEYOND_LIMITS)
     )
-    decision = Decision(
+    decision = decision_of(
         command_pa=commanded.command_pa,
         state=state,
         mode=supervision.mode,
@@ -278,7 +286,7 @@ def step(
         dead_band_m=dead_band_m,
         one_direction=one_direction,
     )
-    return ControllerMemory(
+    return memory_of(
         last=decision,
         wanted_pa=commanded.wanted_pa,
         held_pa=held_pa,
@@ -339,7 +347,7 @@ def _needs(now: Now, band: RestBand | None) -> Needs:
     allowed_pa = 0.0
     if isinstance(signal, Staircase) and now.settings.staircase is not None:
         allowed_pa = signal.most_pa(now.settings.staircase)
-    return Needs(
+    return needs_of(
         by_law=last.state in FOLLOWING,
         band=rest_band(band, ratios, statics, now.settings.limits.stroke_m),
         allowed_pa=allowed_pa,
@@ -418,7 +426,7 @@ def _seen(
     now: Now, reference: Reference, ratios: Ratios | None, outcome: SlideOutcome | None, dead_band_m: float
 ) -> Seen:
     """Return what the law is shown; its ratios are None where it does not command."""
-    return Seen(
+    return seen_of(
         sample=now.sample,
         usable=now.stem_m is not None,
         command_pa=now.memory.wanted_pa,
@@ -503,6 +511,9 @@ class Commanded(NamedTuple):
     path: PathMemory | None
 
 
+commanded_of = by_name(Commanded)
+
+
 def _commanded(now: Now, asked_pa: float, *, lead: bool) -> Commanded | None:
     """Return the command for a pressure that is asked for, Pa; None where it would not be a finite number."""
     settings = now.settings
@@ -510,9 +521,11 @@ def _commanded(now: Now, asked_pa: float, *, lead: bool) -> Commanded | None:
     if not isfinite(limited_pa):
         return None
     wanted_pa = settings.delivered_pa(limited_pa)
+    if now.memory.path is None:
+        return commanded_of(wanted_pa=wanted_pa, command_pa=wanted_pa, path=None) if isfinite(wanted_pa) else None
     path = _path(now, wanted_pa, lead=lead)
     command_pa = wanted_pa if path is None else path.command_pa
-    return Commanded(wanted_pa=wanted_pa, command_pa=command_pa, path=path) if isfinite(command_pa) else None
+    return commanded_of(wanted_pa=wanted_pa, command_pa=command_pa, path=path) if isfinite(command_pa) else None
 
 
 def _held_instead(now: Now) -> Commanded:
@@ -521,7 +534,7 @@ def _held_instead(now: Now) -> Commanded:
     action = settings.limits.action_on(Fault.COMMAND_NOT_FINITE)
     safe_pa = settings.delivered_pa(settings.safe_pa(action, memory.wanted_pa))
     path = None if memory.path is None else long_held(safe_pa, now.sample.now_s)
-    return Commanded(wanted_pa=safe_pa, command_pa=safe_pa, path=path)
+    return commanded_of(wanted_pa=safe_pa, command_pa=safe_pa, path=path)
 
 
 def _path(now: Now, wanted_pa: float, *, lead: bool) -> PathMemory | None:
@@ -583,7 +596,7 @@ def _consumed(now: Now, supervision: SupervisionMemory) -> ConsumedRequests:
     by_hand = mode is MANUAL and latched
     if mode is before and not by_hand:
         return consumed
-    return ConsumedRequests(
+    return consumed_of(
         reference_writes=requests.reference_writes if before is AUTOMATIC else consumed.reference_writes,
         manual_writes=requests.manual_writes if before is MANUAL or by_hand else consumed.manual_writes,
     )

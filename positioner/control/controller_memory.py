@@ -1,7 +1,6 @@
 """What the controller remembers from one step to the next, and what one step decides.
 
-Both are tuples, for they are made anew in each step, and given by name: `tests/control/test_records.py` refuses a
-number by place.
+Both are tuples, for they are made anew in each step, by name (`records`).
 """
 
 from copy import deepcopy
@@ -13,6 +12,7 @@ from positioner.control.laws.boundary import Law
 from positioner.control.monitors import MonitorMemory
 from positioner.control.played_experiment import PlayedExperiment
 from positioner.control.pressure_path import PathMemory
+from positioner.control.records import by_name
 from positioner.control.reference import Reference
 from positioner.control.restoration import Restoration
 from positioner.control.supervision import SupervisionMemory
@@ -91,3 +91,8 @@ class ControllerMemory(NamedTuple):
         """Return another one of all that is known: what is done with either leaves no trace in the other."""
         identification, statics = deepcopy((self.identification, self.statics))
         return self._replace(identification=identification, statics=statics)
+
+
+decision_of = by_name(Decision)
+consumed_of = by_name(ConsumedRequests)
+memory_of = by_name(ControllerMemory)

@@ -98,7 +98,9 @@ def excitation_after(
     if excitation is not None:
         if not excitation.ended:
             too_long = now_s - excitation.start_s > settings.excitation.longest_s
-            excitation = replace(excitation, inhibit_reason=TIME.why if too_long else lacking)
+            ended_by = TIME.why if too_long else lacking
+            if ended_by is not NOTHING:
+                excitation = replace(excitation, inhibit_reason=ended_by)
         return excitation, excitation.inhibit_reason
     if position_m is None:
         return None, MEASURED.why

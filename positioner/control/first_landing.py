@@ -51,8 +51,9 @@ def goes_on(under_way: int, ratios: Ratios | None, way_m: float, *, asked_anew: 
         way_m: from the stem to its reference.
         asked_anew: whether the reference has changed.
     """
-    unseen = ratios is not None and under_way == ratios.directions.unseen
-    return under_way != 0 and unseen and not (asked_anew and under_way * way_m <= 0.0)
+    if under_way == 0 or ratios is None or under_way != ratios.directions.unseen:
+        return False
+    return not (asked_anew and under_way * way_m <= 0.0)
 
 
 def stepped_pa(pressure_pa: float, direction: int, ratios: Ratios, way_m: float, stroke_m: float) -> float:

@@ -27,6 +27,7 @@ from typing import NamedTuple
 from config.codes import Fault
 from config.daemon_file import DaemonFile
 from config.supervision_table import FaultActionName
+from positioner.control.records import by_name
 from positioner.control.rest_band import RestBand
 
 ENDS = 0.02
@@ -128,6 +129,8 @@ class Needs(NamedTuple):
     answers_s: float
 
 
+needs_of = by_name(Needs)
+
 NEVER = (inf, inf, inf, inf, inf, inf)
 """No condition holds."""
 
@@ -145,6 +148,9 @@ class Frozen(NamedTuple):
     """... and for how long none need answer."""
     band: RestBand | None = None
     """What the valve was last known to need."""
+
+
+frozen_of = by_name(Frozen)
 
 
 class MonitorMemory(NamedTuple):
@@ -167,6 +173,9 @@ class MonitorMemory(NamedTuple):
         """Return the first that is a fault, NONE where all are alarms."""
         acting = (each.fault for each in settings.monitors if each.action is not None and each.fault in self.holding)
         return next(acting, Fault.NONE)
+
+
+monitoring_of = by_name(MonitorMemory)
 
 
 def after_cycle(
@@ -209,7 +218,7 @@ def after_cycle(
     inside = settings.low_m < position_m < settings.high_m
     frozen = memory.frozen
     if way_m != 0.0:
-        frozen = Frozen(command_pa=command_pa, pressure_pa=pressure_pa, band=frozen.band)
+        frozen = frozen_of(command_pa=command_pa, pressure_pa=pressure_pa, band=frozen.band)
     elif inside and command_pa != frozen.command_pa and settings.frozen_at < inf:
         needed = needs(frozen.band)
         rests = _rests(frozen, settings, needed, position_m, command_pa=command_pa, pressure_pa=pressure_pa)
@@ -227,7 +236,7 @@ def after_cycle(
         fast,
     )
     since_s, holding = _held(memory, settings, now_s, conditions)
-    return MonitorMemory(
+    return monitoring_of(
         since_s=since_s,
         seen_s=now_s,
         good_s=now_s,

@@ -100,7 +100,7 @@ class Settings:
             dead_band=_dead_band(file),
             staircase=_staircase(file) if file.by_slides else None,
             experiment=_experiment(file),
-            delivered_pa=file.device.delivered_pa,
+            delivered_pa=file.device.delivered_pa if file.device.command_step_pa else _as_it_is,
             valve=valve,
         )
 
@@ -185,3 +185,8 @@ def _ratios(law: LawTable | None) -> Ratios | None:
     if law is None or law.b_over_c_pa_per_m is None or law.k_over_c_pa is None:
         return None
     return Ratios(law.b_over_c_pa_per_m, law.k_over_c_pa, law.offset_pa)
+
+
+def _as_it_is(command_pa: float) -> float:
+    """Return a command of which the device's register can say every number."""
+    return command_pa

@@ -12,6 +12,7 @@ the law it interrupted by itself.
 from typing import NamedTuple
 
 from config.codes import S0, S1, S2, S3, InhibitReason, State
+from positioner.control.records import by_name
 
 
 class Situation(NamedTuple):
@@ -23,6 +24,9 @@ class Situation(NamedTuple):
     delta_r_m: float
     dropped: bool = False
     """Whether what was restored was dropped, and nothing has taken its place."""
+
+
+situation_of = by_name(Situation)
 
 
 def state_in(situation: Situation) -> State:

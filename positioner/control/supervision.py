@@ -14,6 +14,7 @@ from typing import NamedTuple
 from config.codes import HOLD, MANUAL, Fault, Mode, Quality
 from config.quantities import DeviceStatus
 from config.supervision_table import FaultActionName, SafeActionName
+from positioner.control.records import by_name
 from positioner.control.requests import Requests
 from positioner.control.sample import Sample
 
@@ -71,6 +72,8 @@ class SupervisionMemory(NamedTuple):
         return self._replace(mode=MANUAL if by_hand else HOLD, fault=fault)
 
 
+supervision_of = by_name(SupervisionMemory)
+
 UNFIT_STATUS = sum(DeviceStatus)
 """Every bit of it: none is set of a device that measures and obeys."""
 
@@ -122,7 +125,7 @@ def supervise(
         cause = Fault.DCS_SILENT
     acknowledged = requests.acknowledgements != memory.acknowledgements
     fault = cause or (NO_FAULT if acknowledged else memory.fault)
-    return SupervisionMemory(
+    return supervision_of(
         mode=_mode(memory, requests, fault, limits),
         fault=fault,
         bad_in_a_row=bad_in_a_row,

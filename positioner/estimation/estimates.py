@@ -9,16 +9,18 @@ from config.results.result import Brief
 
 
 class Directions(Enum):
-    """Directions in which the stem was seen to slide: of any other, friction is not known."""
+    """Directions in which the stem was seen to slide: of any other, friction is not known.
+
+    Attributes:
+        unseen: the direction in which it was not, +1 up, -1 down; 0: there is none.
+    """
 
     UP = 1
     DOWN = -1
     BOTH = 0
 
-    @property
-    def unseen(self) -> int:
-        """The direction in which it was not, +1 up, -1 down; 0: there is none."""
-        return -self.value
+    def __init__(self, seen: int) -> None:
+        self.unseen = -seen
 
     def __or__(self, other: "Directions") -> "Directions":
         """Return those of both."""

@@ -14,7 +14,11 @@ from positioner.estimation.array import Array
 
 
 class PositionNoise:
-    """Standard deviation of the position's white noise, block by block."""
+    """Standard deviation of the position's white noise, block by block.
+
+    Attributes:
+        std_m: standard deviation in m; 0 before the first block.
+    """
 
     def __init__(self) -> None:
         self.restart()
@@ -22,12 +26,9 @@ class PositionNoise:
     def restart(self) -> None:
         """Forget every block."""
         self._blocks: list[float] = []
+        self.std_m = 0.0
 
     def add(self, position_m: Array) -> None:
         """Take a block of positions, (N,), N >= 4, m, evenly sampled or nearly so."""
         self._blocks.append(float(noise_by_median(np.diff(position_m, 3))))
-
-    @property
-    def std_m(self) -> float:
-        """Standard deviation in m; 0 before the first block."""
-        return median(self._blocks) if self._blocks else 0.0
+        self.std_m = median(self._blocks)

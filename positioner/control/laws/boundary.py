@@ -15,6 +15,7 @@ from typing import ClassVar, NamedTuple, Protocol, Self
 from config.codes import InhibitReason
 from config.daemon_file import DaemonFile
 from config.extended_valve import ExtendedValve
+from positioner.control.records import by_name
 from positioner.control.sample import Sample
 from positioner.control.valve_knowledge import ValveKnowledge
 from positioner.estimation.acceptance import Ratios
@@ -43,6 +44,9 @@ class Seen(NamedTuple):
     """Rests and landings of the stem, and the static law that they give."""
     valve: ExtendedValve | None
     """Whose effects are known: then the law works with its inverse."""
+
+
+seen_of = by_name(Seen)
 
 
 class Law(Protocol):

@@ -166,7 +166,6 @@ class LandingDetector:
         """Whether the last change of the command is so long ago that what moves the stem is no answer to it."""
         return self._time_s - self._level_s > LATE * max(self._answers_s, FIRST_ANSWER_S)
 
-    @property
     def _no_answer_m_per_s(self) -> float:
         """Return how slow a stem must go for that to be no answer to the command any more; 0: it may always be one."""
         if self._answered:

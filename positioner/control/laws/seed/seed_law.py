@@ -57,7 +57,10 @@ class SeedLaw(Unlearning):
         rest_m = None if rest is None else rest.position_m
         course = self.course.after(seen.reference_m, seen.direction, seen.command_pa, rest_m, settings.stroke_m)
         balance = seen.ratios.balance_pa if seen.statics.valve is None else seen.statics.valve.landing_pa
-        return SeedLaw(settings, balance(seen.reference_m, course.direction), course, _why_away(seen, settings))
+        command_pa, why = balance(seen.reference_m, course.direction), _why_away(seen, settings)
+        if course is self.course and (command_pa, why) == (self.command_pa, self.inhibit_reason):
+            return self
+        return SeedLaw(settings, command_pa, course, why)
 
 
 def _why_away(seen: Seen, settings: SeedSettings) -> InhibitReason:
