@@ -163,13 +163,11 @@ def baseline(folder: Path, test: str, against: str | None) -> Record | None:
 
 
 def changes(now: Outcome, before: Outcome) -> list[Change]:
-    """Return the figures of both, how far each is off."""
+    """Return the figures of both, how far each is off; one without a +- can be compared with nothing."""
     then = {each.name: each for each in before.quantities}
-    return [
-        Change(each, then[each.name], _deviations(each.figure, then[each.name].figure))
-        for each in now.quantities
-        if each.name in then
-    ]
+    both = [(each, then[each.name]) for each in now.quantities if each.name in then]
+    told = [pair for pair in both if all(each.figure.value is None or each.figure.plus_minus for each in pair)]
+    return [Change(each, was, _deviations(each.figure, was.figure)) for each, was in told]
 
 
 def change_table(told: Sequence[Change], since: str) -> Table:

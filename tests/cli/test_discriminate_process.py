@@ -13,8 +13,9 @@ from config.codes import ExperimentState, State
 from config.daemon_file import load_daemon
 from positioner.cli.main import main
 from positioner.cli.parts.children import port_in
-from positioner.cli.parts.experiment_player import is_of, player_on
+from positioner.cli.parts.experiment_player import RunningValve, is_of, player_on
 from positioner.dcs import Dcs
+from positioner.tests_on_the_valve.program import Leap, ramped
 from tests.children import running
 from tests.cli.test_daemon_process import daemon_file, slave_file, until
 from workbench.discriminate.experiment_design import Course, DesignedExperiment, Leg
@@ -97,6 +98,19 @@ def test_an_experiment_is_played_recorded_and_found(site: Site) -> None:
     assert np.ptp(played.recording.position_m) > 0.0
     with site.dcs() as dcs:
         assert dcs.get("command") == pytest.approx(24e3), "the pressure before has come back"
+    assert_turns(RunningValve(load_daemon(site.config), site.arguments))
+
+
+def assert_turns(valve: RunningValve) -> None:
+    """Assert that a program turns at its travel, and that its recording is found although it is not the whole."""
+    begun_m, start_pa = valve.stem_m(), valve.command_pa()
+    program = ramped("up", start_pa, (Leap(start_pa, 0.2), Leap(start_pa + 60e3, 0.1)), 60e3, turn_m=5e-3, band_m=0.02)
+    played = valve.play(program)
+    assert (played.state, played.problem) == (ExperimentState.TURNED, "")
+    assert played.recording is not None
+    assert 5e-3 <= float(np.max(played.recording.position_m)) - begun_m < 0.02
+    assert float(np.max(played.recording.command_pa)) < start_pa + 60e3
+    assert valve.command_pa() == pytest.approx(start_pa)
 
 
 def test_a_veto_from_elsewhere_stops_it(site: Site) -> None:

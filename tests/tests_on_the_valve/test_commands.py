@@ -1,0 +1,113 @@
+"""The commands of tests on a running valve: what they print, keep and return; the daemon is in virtual time."""
+
+import json
+from collections.abc import Iterator
+from pathlib import Path
+
+import pytest
+
+from config.slave_file import Initial
+from positioner.cli.main import main
+from positioner.tests_on_the_valve.kept_records import Record, folder_of, records
+from positioner.tests_on_the_valve.program import Played, Program
+from tests.tests_on_the_valve.virtual_valve import AREA_M2, MAXIMUM_PA, SLOPE, STROKE_M, VirtualValve, daemon_file, told
+
+TIGHT = told(coulomb_n=400.0, static_n=440.0)
+SITE = f"""[valve]
+name = "FV-1"
+stroke_m = {STROKE_M}
+[pressure]
+maximum_pa = {MAXIMUM_PA}
+[history]
+folder = "history"
+[experiment]
+travel_window = [0, 1]
+limit_s = 40
+"""
+
+
+class InMemory(VirtualValve):
+    """In place of `RunningValve`."""
+
+    def stem_m(self) -> float:
+        return self.cycle.snapshot.sample.position_m
+
+    def slope_pa_per_m(self) -> float:
+        return SLOPE
+
+    def dead_band_pa(self) -> float:
+        return 840.0 / AREA_M2
+
+
+class Interrupted(InMemory):
+    """Whose tester presses Ctrl-C."""
+
+    def play(self, program: Program) -> Played:
+        raise KeyboardInterrupt
+
+
+@pytest.fixture
+def site(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Iterator[Path]:
+    path = tmp_path / "site.toml"
+    path.write_text(SITE)
+    monkeypatch.setattr("positioner.cli.parts.experiment_player.require_ready", lambda *_: None)
+    serve(monkeypatch, InMemory)
+    return path
+
+
+def serve(monkeypatch: pytest.MonkeyPatch, kind: type[InMemory]) -> None:
+    file = daemon_file(experiment={"limit_s": 60.0})
+    valve = kind(TIGHT, file, initial=Initial(position_m=STROKE_M, pressure_pa=130e3))
+    monkeypatch.setattr("positioner.cli.parts.experiment_player.RunningValve", lambda *_: valve)
+
+
+def kept(site: Path) -> list[Record]:
+    return records(folder_of(site.parent / "history", "FV-1"))
+
+
+def test_a_partial_stroke_is_kept_trended_and_may_claim_its_credit(
+    site: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    told_json = site.parent / "pst.json"
+    assert main(["pst", str(site), "--keep", "as_left", "--json", str(told_json)]) == 0
+    assert "no reference: friction and times are not judged" in capsys.readouterr().out
+    assert main(["pst", str(site), "--failure-rate-per-h", "1e-6"]) == 0
+    out = capsys.readouterr().out
+    assert "the last 2 of 2" in out
+    assert "PFD_avg 0.0156 with this test every 30 days, 0.0285 without it" in out
+    assert [each.kind for each in kept(site)] == ["as_left", ""]
+    found = json.loads(told_json.read_text())
+    assert (found["test"], found["passed"]) == ("partial stroke test", True)
+    assert found["figures"]["travel_m"]["plus_minus"] is not None
+    assert main(["pst", str(site), "--travel", "0.9"]) == 2
+    assert "--travel: allowed is 0.01 to 0.5 of the stroke, got 0.9" in capsys.readouterr().err
+
+
+def test_one_that_is_broken_off_by_ctrl_c_is_kept_as_no_reference(site: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    serve(monkeypatch, Interrupted)
+    assert main(["pst", str(site), "--keep", "as_left"]) == 130
+    (record,) = kept(site)
+    assert (record.kind, record.outcome.said) == ("", "broken off")
+
+
+@pytest.mark.parametrize(
+    ("words", "said"),
+    [
+        (["cst", "--rate", "0.01", "--start", "0.002"], "break-away friction over the area"),
+        (["steps", "--held-s", "0.3"], "resolution, of the span"),
+    ],
+    ids=["continuous stroke", "steps"],
+)
+def test_the_others_pass_and_print_their_figures(
+    words: list[str], said: str, site: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    command, *options = words
+    assert main([command, str(site), "--keep", "as_found", *options]) in (0, 1)
+    assert said in capsys.readouterr().out
+    assert [each.kind for each in kept(site)] == ["as_found"]
+
+
+def test_a_signature_is_played_and_compared(site: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    assert main(["signature", str(site), "--keep", "factory", "--area-m2", str(AREA_M2)]) == 0
+    assert main(["signature", str(site)]) == 0
+    assert "nothing has changed since the factory of" in capsys.readouterr().out
