@@ -15,6 +15,9 @@ from positioner.cli.parts.valve_test import (
 HELP = "dead band, resolution and step response by small steps of the command (moves it: state S3)"
 EXAMPLE = "positioner steps site.toml --held-s 2"
 
+AT_AN_END = 0.05
+"""Of the stroke: a stem so near an end may be pressed onto it."""
+
 
 def add_arguments(parser: argparse.ArgumentParser) -> None:
     """Declare the command line."""
@@ -22,13 +25,13 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
     parser.add_argument(
         "--dead-band-pa", type=float, metavar="PA", help="as expected (twice the friction that is known)"
     )
-    parser.add_argument("--held-s", type=float, default=1.0, metavar="S", help="how long each step is held (1)")
+    parser.add_argument("--held-s", type=float, default=0.8, metavar="S", help="how long each step is held (0.8)")
     parser.add_argument("--most", type=float, default=0.3, metavar="SHARE", help="travel that breaks it off (0.3)")
 
 
 def run(arguments: argparse.Namespace) -> int:
     """Step, print dead band, resolution and times; 0 if both are bracketed, else 1."""
-    from config.errors import InputError
+    from config.errors import CommandFailed, InputError
     from positioner.cli.parts.experiment_player import RunningValve, require_ready
     from positioner.tests_on_the_valve.small_steps import TEST, SmallSteps, programme, small_steps
 
@@ -39,6 +42,8 @@ def run(arguments: argparse.Namespace) -> int:
     expected_pa = arguments.dead_band_pa or valve.dead_band_pa()
     if expected_pa is None:
         raise InputError("--dead-band-pa", "is required while the valve is not identified")
+    if not AT_AN_END < valve.stem_m() / file.valve.stroke_m < 1.0 - AT_AN_END:
+        raise CommandFailed("the stem is at an end, where steps move nothing: positioner set reference 0.5")
     asked = SmallSteps(expected_pa, arguments.held_s, arguments.most)
     program = programme(asked, bounds_of(file), valve.command_pa(), file.valve.stroke_m, str(arguments.config))
     with playing(TEST, file, arguments):

@@ -35,7 +35,7 @@ class SmallSteps:
     """What is asked for: the dead band expected, Pa; how long a step is held, s; the most travel, of the stroke."""
 
     dead_band_pa: float
-    held_s: float = 1.0
+    held_s: float = 0.8
     most: float = 0.3
 
     def require_possible(self) -> None:

@@ -2,10 +2,12 @@
 
 from typing import cast
 
+import numpy as np
 import pytest
 
 from config.codes import ExperimentState, Fault
-from positioner.cli.parts.experiment_player import why_not
+from config.recording import Recording
+from positioner.cli.parts.experiment_player import is_of, why_not
 from positioner.dcs import Dcs
 
 
@@ -31,3 +33,25 @@ class Panel:
 )
 def test_of_a_fault_it_is_said_which(state: ExperimentState, fault: Fault, said: str) -> None:
     assert why_not(state, cast(Dcs, Panel(fault))) == said
+
+
+FAST = ((0.0, 20e3), (1.0, 20e3), (3.0, 100e3), (4.0, 100e3), (6.0, 20e3), (7.0, 20e3))
+
+
+@pytest.mark.parametrize(
+    ("points", "same"),
+    [
+        (FAST, True),
+        (((0.0, 20e3), (1.0, 20e3), (3.0, 80e3), (4.0, 80e3), (6.0, 20e3), (7.0, 20e3)), False),
+        (((0.0, 20e3), (1.0, 20e3), (2.0, 100e3), (5.0, 100e3), (6.0, 20e3), (7.0, 20e3)), False),
+    ],
+    ids=["what was played", "not so far", "faster"],
+)
+def test_a_ramp_of_a_slow_loop_is_found_though_cycles_were_late(
+    points: tuple[tuple[float, float], ...], same: bool
+) -> None:
+    """A command that is held for 50 ms lags a ramp by 2 % of what that spans."""
+    time_s = np.arange(0.0, 8.0, 0.05) + np.random.default_rng(0).uniform(0.0, 0.02, 160)
+    held_s = np.repeat(np.arange(0.0, 8.0, 0.1), 2)[: len(time_s)] - 0.5
+    columns = {"time_s": time_s, "command_pa": np.interp(held_s, *np.array(FAST).T), "position_m": 0.0 * time_s}
+    assert is_of(Recording(columns), points) is same

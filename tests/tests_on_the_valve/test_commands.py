@@ -1,7 +1,6 @@
 """The commands of tests on a running valve: what they print, keep and return; the daemon is in virtual time."""
 
 import json
-from collections.abc import Iterator
 from pathlib import Path
 
 import pytest
@@ -10,9 +9,19 @@ from config.slave_file import Initial
 from positioner.cli.main import main
 from positioner.tests_on_the_valve.kept_records import Record, folder_of, records
 from positioner.tests_on_the_valve.program import Played, Program
-from tests.tests_on_the_valve.virtual_valve import AREA_M2, MAXIMUM_PA, SLOPE, STROKE_M, VirtualValve, daemon_file, told
+from tests.tests_on_the_valve.virtual_valve import (
+    AREA_M2,
+    MAXIMUM_PA,
+    MIDWAY,
+    SLOPE,
+    STROKE_M,
+    VirtualValve,
+    daemon_file,
+    told,
+)
 
 TIGHT = told(coulomb_n=400.0, static_n=440.0)
+WIDE_OPEN = Initial(position_m=STROKE_M, pressure_pa=130e3)
 SITE = f"""[valve]
 name = "FV-1"
 stroke_m = {STROKE_M}
@@ -47,7 +56,7 @@ class Interrupted(InMemory):
 
 
 @pytest.fixture
-def site(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Iterator[Path]:
+def site(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Path:
     path = tmp_path / "site.toml"
     path.write_text(SITE)
     monkeypatch.setattr("positioner.cli.parts.experiment_player.require_ready", lambda *_: None)
@@ -55,9 +64,8 @@ def site(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Iterator[Path]:
     return path
 
 
-def serve(monkeypatch: pytest.MonkeyPatch, kind: type[InMemory]) -> None:
-    file = daemon_file(experiment={"limit_s": 60.0})
-    valve = kind(TIGHT, file, initial=Initial(position_m=STROKE_M, pressure_pa=130e3))
+def serve(monkeypatch: pytest.MonkeyPatch, kind: type[InMemory], initial: Initial = WIDE_OPEN) -> None:
+    valve = kind(TIGHT, daemon_file(experiment={"limit_s": 60.0}), initial=initial)
     monkeypatch.setattr("positioner.cli.parts.experiment_player.RunningValve", lambda *_: valve)
 
 
@@ -99,12 +107,18 @@ def test_one_that_is_broken_off_by_ctrl_c_is_kept_as_no_reference(site: Path, mo
     ids=["continuous stroke", "steps"],
 )
 def test_the_others_pass_and_print_their_figures(
-    words: list[str], said: str, site: Path, capsys: pytest.CaptureFixture[str]
+    words: list[str], said: str, site: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
 ) -> None:
+    serve(monkeypatch, InMemory, MIDWAY)
     command, *options = words
-    assert main([command, str(site), "--keep", "as_found", *options]) in (0, 1)
+    assert main([command, str(site), "--keep", "as_found", *options]) == 0
     assert said in capsys.readouterr().out
     assert [each.kind for each in kept(site)] == ["as_found"]
+
+
+def test_steps_of_a_stem_at_its_end_are_refused(site: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    assert main(["steps", str(site)]) == 1
+    assert "the stem is at an end, where steps move nothing" in capsys.readouterr().err
 
 
 def test_a_signature_is_played_and_compared(site: Path, capsys: pytest.CaptureFixture[str]) -> None:

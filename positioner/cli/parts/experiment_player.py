@@ -23,6 +23,7 @@ RECORDED_WITHIN_S = 30.0
 POLL_S = 0.3
 LATEST_FILES = 2
 """Of the recorder, in which an experiment may lie."""
+HELD_CYCLES = 1.5
 SAME, MOSTLY = 0.01, 0.95
 """Of the sequence's pressures, and of its length: farther from them, or for less, a recording is of something else."""
 
@@ -192,10 +193,13 @@ def is_of(recording: Recording, points: tuple[tuple[float, float], ...]) -> bool
     wanted_s = np.linspace(0.0, at_s[-1], 400)
     wanted_pa = np.interp(wanted_s, at_s, levels_pa)
     span_pa = max(float(np.ptp(levels_pa)), 1.0)
+    # Between two samples the command is held: it is where it was to be then, by a cycle and a half at the most.
+    held_s = HELD_CYCLES * float(np.median(np.diff(time_s)))
+    allowed_pa = SAME * span_pa + held_s * np.abs(np.gradient(wanted_pa, wanted_s))
 
     def share(begin_s: float) -> float:
         apart_pa = np.abs(np.interp(begin_s + wanted_s, time_s, recording.command_pa) - wanted_pa)
-        return float(np.mean(apart_pa < SAME * span_pa))
+        return float(np.mean(apart_pa < allowed_pa))
 
     return any(share(begin_s) > MOSTLY for begin_s in np.linspace(0.0, latest_s, 200).tolist())
 
