@@ -67,6 +67,13 @@ def _positioned(actuator: object) -> object:
     return actuator
 
 
+def _by_stroke(_: object) -> None:
+    raise ValueError(
+        "a rotary valve is positioned by its actuator: write stroke_m, the travel of the piston, and let the scale of "
+        "device.map.position_m make 0 to stroke_m of its degrees"
+    )
+
+
 class ValveTable(Schema):
     """Table `[valve]`: what the controller must know of the valve before it identifies anything."""
 
@@ -78,6 +85,9 @@ class ValveTable(Schema):
     """One pressure against a spring."""
     breakaway_pa: Pressure | None = None
     """F_s / A where it is known: the excitation's constant part must exceed it."""
+
+    travel_deg: Annotated[None, BeforeValidator(_by_stroke)] = None
+    """What a rotary valve has; refused, with what to write in its place."""
 
     @property
     def travel(self) -> Travel:

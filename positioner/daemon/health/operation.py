@@ -3,7 +3,7 @@
     opening       histogram of h
     deviation     histogram of |r - h| in automatic, outside S3
     cycle span    histogram of how far the stem goes from one turn to the next
-    saturated     the command within 1 % of its span of a limit, though the stem is pressed onto no stop
+    saturated     in automatic, the command within 1 % of its span of a limit, though the stem is pressed onto no stop
     ends          h where the valve is pressed shut, and where it is pressed open, means
     course        of a stem at rest, by how far it is outside what the identified valve allows under its command:
                   max(|x - (u - p_0) / k| - F_c / k, 0)          k = k_s / A, p_0 offset, F_c as a pressure
@@ -34,8 +34,8 @@ from positioner.daemon.health.travel_accumulator import SPANS
 DAY_S = 86_400.0
 DAYS = 31
 """That are kept."""
-OPENINGS = tuple(each / 20 for each in range(21))
-"""Edges of the histogram; what lies beyond is counted at its ends."""
+OPENINGS = tuple(each / 20 for each in range(1, 20))
+"""Edges between the bins; what lies beyond the ends is counted in the first and the last."""
 DEVIATIONS = (0.001, 0.002, 0.005, 0.01, 0.02, 0.05, 0.1)
 """Upper edges, shares of the stroke; the last bin is beyond."""
 NEAR_LIMIT = 0.01
@@ -151,9 +151,9 @@ class Operation:
             shut = (decision.cut_off < WITHIN) != self._travel.closes
             name = "shut" if shut else "opened"
             changes[name] = getattr(day, name).with_one(opening)
-        elif not low_pa + near_pa <= command_pa <= high_pa - near_pa:
-            changes["saturated"] = day.saturated + 1
         if decision.mode is Mode.AUTOMATIC and decision.state is not S3 and decision.cut_off == WITHIN:
+            if not low_pa + near_pa <= command_pa <= high_pa - near_pa:
+                changes["saturated"] = day.saturated + 1
             away = abs(self._travel.opening(decision.reference_m) - opening)
             changes |= {"deviation": _counted(day.deviation, DEVIATIONS, away), "away": day.away.with_one(away)}
         if before is not None:

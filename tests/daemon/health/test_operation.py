@@ -37,7 +37,7 @@ def test_each_second_is_counted_once_and_a_month_is_kept() -> None:
     assert len(operation.days) == DAYS
     today = operation.today
     assert (today.day, today.seconds, sum(today.opening), sum(today.deviation)) == (DAYS + 8, 6, 6, 6)
-    assert (today.opening[0], today.opening[11], today.opening[12], today.opening[-1]) == (1, 3, 1, 1)
+    assert (today.opening[0], today.opening[10], today.opening[11], today.opening[-1]) == (1, 3, 1, 1)
     assert today.away.value == pytest.approx((0.0 + 0.02 + 0.02 + 0.06 + 0.51 + 0.51) / 6)
 
 
