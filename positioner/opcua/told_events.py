@@ -38,7 +38,7 @@ class ToldEvents:
             return []
         newest, last = served[-1].number, self._last
         self._last = newest
-        if last is None or newest <= last:  # the first look, or a daemon that counts from the beginning again
+        if last is None:
             return []
         new = [each for each in served if last < each.number <= newest]
         return self._from_history(last) or new if len(new) < newest - last else new
