@@ -386,8 +386,12 @@ def _dead_band_m(now: Now, applied: Applied) -> float:
     memory, settings = now.memory, now.settings.dead_band
     if settings.fixed_m is not None:
         return settings.fixed_m
+    statics, breakaway = memory.statics, memory.identification.estimates.breakaway
+    band = None
+    if settings.jumps:
+        band = rest_band(memory.monitoring.frozen.band, applied.ratios, statics, settings.stroke_m)
     return settings.in_force_m(
-        memory.statics.detector.noise_m, memory.identification.estimates.breakaway, applied.ratios
+        statics.detector.noise_m, breakaway, applied.ratios, 0.0 if band is None else band.jump_m
     )
 
 

@@ -55,6 +55,11 @@ class RestBand:
         low_pa, high_pa = (static_pa * (UNSEEN if unseen == each else 1.0) for each in (-1, 1))
         return middle_pa - low_pa - self.off_pa, middle_pa + high_pa + self.off_pa
 
+    @property
+    def jump_m(self) -> float:
+        """How far the stem jumps at the most when it breaks loose, (F_s - F_c)/k_s."""
+        return min(self.beyond_pa, STATIC * -self.ratios.k_over_c) / -self.ratios.b_over_c
+
 
 def rest_band(
     before: RestBand | None, ratios: Ratios | None, statics: StaticIdentification, stroke_m: float

@@ -1,15 +1,19 @@
 """From the signal to the reference: characteristics and inverses, split range, low-pass, ramp, cut-offs, dead band."""
 
+from dataclasses import replace
 from itertools import pairwise
 
 import numpy as np
 import pytest
 
-from config.codes import Refusal
+from config.codes import Mode, Refusal
 from config.daemon_file import DaemonFile
 from config.errors import InputError
 from config.loading import validated
+from config.slave_file import SlaveFile
 from config.travel_table import TravelTable
+from config.valve_file import shipped_valve
+from positioner.control.requests import QUIET, Requests
 from positioner.control.travel.characteristic import Characteristic, characteristic_of
 from positioner.control.travel.course import Course, OnCourse
 from positioner.control.travel.cutoffs import HIGH, LOW, WITHIN, Cutoffs
@@ -17,6 +21,8 @@ from positioner.control.travel.dead_band import DeadBand
 from positioner.control.travel.signal_path import SignalPath
 from positioner.estimation.acceptance import Ratios
 from positioner.estimation.estimates import Estimate, no_estimate
+from positioner.virtual.virtual_cycle import identified, virtual_cycle
+from sim.slave.modbus_slave import device_of
 from tests.daemon.test_supervisory_registers import Panel
 
 POINTS = [[0.0, 0.02], [0.3, 0.05], [0.31, 0.6], [1.0, 0.98]]
@@ -152,7 +158,9 @@ def test_an_adapting_dead_band_is_three_deviations_or_half_a_jump_of_a_law_that_
     assert places.in_force_m(1e-4, breakaway, ratios) == pytest.approx(3e-4)
     assert hunts.in_force_m(1e-5, breakaway, ratios) == pytest.approx(0.02 * STROKE_M), "and no more than 2 %"
     assert hunts.in_force_m(1e-5, Estimate(2.1e4, 1.0, Refusal.VALID), ratios) == pytest.approx(5e-4)
-    assert hunts.in_force_m(1e-5, no_estimate(Refusal.NO_BREAKAWAY), ratios) == pytest.approx(5e-5)
+    unknown = no_estimate(Refusal.NO_BREAKAWAY)
+    assert hunts.in_force_m(1e-5, unknown, ratios) == pytest.approx(5e-5)
+    assert hunts.in_force_m(1e-5, unknown, ratios, 2e-3) == pytest.approx(1e-3)
     assert DeadBand(STROKE_M, fixed_m=1e-3, jumps=True).in_force_m(1.0, breakaway, ratios) == 1e-3
 
 
@@ -206,3 +214,35 @@ def test_the_dcs_reads_what_it_wrote_and_what_becomes_of_it() -> None:
     panel.set("mode", 2)
     panel.run()
     assert panel.get("reference_in_force") == pytest.approx(panel.get("position"), abs=1e-3), "no bump after hold"
+
+
+def hunting(dead_band: float | str) -> tuple[float, float]:
+    """Return the strokes that PI goes in half a minute about a reference that stands, and its dead band."""
+    tables = {
+        "valve": {"stroke_m": 0.1016},
+        "pressure": {"maximum_pa": 200e3},
+        "control": {"law": "conventional", "dead_band": dead_band},
+    }
+    slave = {
+        "clock": {"mode": "lockstep", "period_s": 0.02},
+        "initial": {"position_m": 0.02, "pressure_pa": 17e3},
+        "sensor": {"noise_std_m": 1e-5},
+        "change": [{"at_s": 0.0, "static_n": 1500.0}],
+    }
+    device = device_of(SlaveFile.model_validate(slave), shipped_valve("seed"))
+    cycle = virtual_cycle(DaemonFile.model_validate(tables), device, Requests(mode=Mode.AUTOMATIC, mode_writes=1))
+    list(identified(cycle, 600.0, wait=False))
+    assert cycle.health is not None
+    cycle.requests = replace(cycle.requests, eta=QUIET, reference_m=0.05, reference_writes=1)
+    for _ in range(500):
+        cycle.once()
+    before_m = cycle.health.record.travel_m
+    for _ in range(1500):
+        cycle.once()
+    return (cycle.health.record.travel_m - before_m) / 0.1016, cycle.snapshot.decision.dead_band_m / 0.1016
+
+
+def test_an_adapting_dead_band_ends_the_hunting_of_a_law_that_commands_all_the_while() -> None:
+    (fixed, _), (adapted, band) = hunting(5e-4), hunting("auto")
+    assert 0.005 < band < 0.02
+    assert adapted < 0.2 * fixed
