@@ -16,6 +16,8 @@ Bounds = ExperimentLimits
 """What every program must stay inside: those of the experiments."""
 SHORTEST_S = 1e-3
 """Between two points, which must follow each other."""
+FLOAT32 = 2.0**-23
+"""Times go as float32: each is off by as much of itself, so that a short leap late in a program would be too fast."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -85,7 +87,7 @@ def ramped(
     for leap in leaps:
         time_s, before_pa = points[-1]
         if leap.to_pa != before_pa:
-            time_s += max(SHORTEST_S, abs(leap.to_pa - before_pa) / rate_pa_per_s)
+            time_s += max(SHORTEST_S, abs(leap.to_pa - before_pa) / rate_pa_per_s) + 2.0 * FLOAT32 * time_s
             points.append((time_s, leap.to_pa))
         if leap.held_s > 0.0:
             points.append((time_s + leap.held_s, leap.to_pa))

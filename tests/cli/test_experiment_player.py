@@ -53,5 +53,6 @@ def test_a_ramp_of_a_slow_loop_is_found_though_cycles_were_late(
     """A command that is held for 50 ms lags a ramp by 2 % of what that spans."""
     time_s = np.arange(0.0, 8.0, 0.05) + np.random.default_rng(0).uniform(0.0, 0.02, 160)
     held_s = np.repeat(np.arange(0.0, 8.0, 0.1), 2)[: len(time_s)] - 0.5
+    time_s, held_s = time_s[:-10], held_s[:-10]  # and the last rows are missing
     columns = {"time_s": time_s, "command_pa": np.interp(held_s, *np.array(FAST).T), "position_m": 0.0 * time_s}
     assert is_of(Recording(columns), points) is same

@@ -4,6 +4,7 @@ from collections.abc import Iterator
 from contextlib import contextmanager
 from pathlib import Path
 
+import numpy as np
 import pytest
 
 from config.codes import Fault, ValveTestVerdict
@@ -15,6 +16,7 @@ from config.travel import ActionWord
 from config.valve_file import EffectTable
 from positioner.cli.main import main
 from positioner.cli.parts.own_valve import unknown_travel
+from positioner.control.played_experiment import ROUNDING
 from positioner.control.settings import Settings
 from positioner.tests_on_the_valve.commissioning import Commissioned, commission
 from positioner.tests_on_the_valve.small_steps import SmallSteps, programme, small_steps
@@ -199,6 +201,14 @@ def test_small_steps_bracket_dead_band_and_resolution() -> None:
         figure = outcome.figure(name)
         assert figure.value == pytest.approx(true_n / AREA_M2, abs=figure.plus_minus)
     assert outcome.figure("least_move_m").value == pytest.approx(40.0 / PARAMETERS.spring_n_per_m, rel=0.4)
+
+
+def test_steps_over_the_wire_are_no_faster_than_permitted() -> None:
+    """Times and pressures go as float32, which rounds a leap of a millisecond late in a program by a part of itself."""
+    bounds = Settings.of(daemon_file()).experiment
+    program = programme(SmallSteps(5750.0, held_s=2.0), bounds, 60e3, STROKE_M)
+    time_s, pressure_pa = np.array(program.points, dtype=np.float32).astype(float).T
+    assert np.max(np.abs(np.diff(pressure_pa)) / np.diff(time_s)) <= bounds.rate_pa_per_s * (1.0 + ROUNDING)
 
 
 def test_steps_without_room_are_refused() -> None:
