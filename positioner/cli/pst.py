@@ -66,7 +66,7 @@ def run(arguments: argparse.Namespace) -> int:
         played, asked, file.valve.name, stroke_m, None if reference is None else reference.outcome, limits
     )
     status = finished(outcome, file, arguments, always_kept=True, compared=False)
-    print(trend_of(TEST, ("breakout_pa", "travel_m", "stroke_s"), file, arguments))
+    print(trend_of(TEST, ("breakout_pa", "reached_m", "stroke_s"), file, arguments))
     if credit is not None:
         print("\n".join(credit.lines() if outcome.passed else ["it did not pass: no credit may be claimed"]))
     return status

@@ -25,7 +25,10 @@ if TYPE_CHECKING:
     from pathlib import Path
 
 TITLES = {"factory": "factory", "as_found": "as found", "as_left": "as left"}
-WIDTH, HEIGHT, EDGE = 640, 300, 46
+OFF = 0.05
+"""Of what is recommended: a figure that is farther from it, and farther than its own ±, is marked."""
+MARK = f"* off what is recommended, by more than {OFF:.0%} and by more than its own ±"
+WIDTH, HEIGHT, EDGE = 640, 300, 56
 """Of a picture, in its own units."""
 INKS = {"as_found": ("#d9622b", "#e8a27f"), "as_left": ("#1b7f79", "#7db8b4"), "factory": ("#5b6675", "#9aa4b1")}
 SIGNED = ("tested by", "date", "signature", "accepted by", "date", "signature")
@@ -88,7 +91,7 @@ class ValveReport:
         for name in names:
             told = [figures.get(name) for figures in by_kind.values()]
             first = next(each for each in told if each is not None)
-            rows.append((first.text, self._recommended(first), *(each.shown if each else "-" for each in told)))
+            rows.append((first.text, self._recommended(first), *(self._shown(each) for each in told)))
         verdicts = ("verdict", "", *(record.outcome.said for record in kept.values()))
         return Table(("figure", "recommended ", *(f"{TITLES[kind]} " for kind in kept)), [verdicts, *rows], test)
 
@@ -103,8 +106,22 @@ class ValveReport:
                     told.append(table)
         return told
 
+    def _value(self, quantity: Quantity) -> float | None:
+        return self.recommended.get(quantity.name, quantity.expected)
+
+    def _shown(self, quantity: Quantity | None) -> str:
+        """Return a figure as it is shown, marked where it is off what is recommended."""
+        if quantity is None:
+            return "-"
+        wanted, figure = self._value(quantity), quantity.figure
+        if wanted is None or figure.value is None:
+            return quantity.shown
+        off = abs(figure.value - wanted)
+        marked = off > OFF * abs(wanted) and off > (figure.plus_minus or 0.0)
+        return f"{quantity.shown} *" if marked else quantity.shown
+
     def _recommended(self, quantity: Quantity) -> str:
-        value = self.recommended.get(quantity.name, quantity.expected)
+        value = self._value(quantity)
         if value is None:
             return ""
         return Quantity(quantity.name, "", quantity.unit, quantity.figure, value).shown_expected
@@ -131,7 +148,7 @@ def as_html(report: ValveReport) -> str:
     title = f"Valve {report.valve}: as found and as left"
     parts = [
         f"<h1>{escape(title)}</h1><p class='quiet'>written {now:%Y-%m-%d %H:%M} UTC; every ± is two standard deviations"
-        " or half a bracket; what cannot be determined says why</p>",
+        f" or half a bracket; what cannot be determined says why; {MARK}</p>",
         *(_section(report, each) for each in report.tests()),
         f"<section><h2>Configuration</h2>{_configuration(report)}</section>",
         "<section><h2>Signed</h2><dl>" + "".join(f"<div><dt>{each}</dt></div>" for each in SIGNED) + "</dl></section>",
@@ -252,8 +269,8 @@ def _svg(pictures: Mapping[str, Picture | None]) -> str:
         f"{escape(axes.y)}</text>",
         f'<text x="{EDGE}" y="{HEIGHT - EDGE + 16}">{left:.4g}</text>',
         f'<text x="{WIDTH - EDGE}" y="{HEIGHT - EDGE + 16}" text-anchor="end">{right:.4g}</text>',
-        f'<text x="{EDGE - 4}" y="{HEIGHT - EDGE}" text-anchor="end">{low:.4g}</text>',
-        f'<text x="{EDGE - 4}" y="{EDGE + 4}" text-anchor="end">{high:.4g}</text>',
+        f'<text x="{EDGE - 4}" y="{HEIGHT - EDGE}" text-anchor="end">{low:.3g}</text>',
+        f'<text x="{EDGE - 4}" y="{EDGE + 4}" text-anchor="end">{high:.3g}</text>',
         *(
             f'<text x="{EDGE + 130 * number}" y="20" fill="{INKS[kind][0]}">{TITLES[kind]}</text>'
             for number, kind in enumerate(seen)

@@ -240,9 +240,14 @@ def _figures(
         Quantity("start_m", "where the stem rested", "m", Figure(rest.position_m, rest.error_m)),
         Quantity("breakout_pa", "break-out, from the command in force", "Pa", out_pa),
         Quantity("breakout_s", "time to the break-out", "s", out_s),
-        Quantity("travel_m", "travel reached", "m", travel, asked.travel * stroke_m),
+        Quantity("reached_m", "travel reached", "m", travel, asked.travel * stroke_m),
         Quantity("stroke_s", "time from the break-out to the travel", "s", within),
-        Quantity("friction_pa", "friction over the area, lag and all", "Pa", _friction(recording, rest, travel, state)),
+        Quantity(
+            "friction_at_rate_pa",
+            "friction over the area, lag and all",
+            "Pa",
+            _friction(recording, rest, travel, state),
+        ),
         Quantity("back_m", "back at, from where it was", "m", off),
         Quantity("noise_m", "noise at rest", "m", Figure(rest.noise_m)),
     ]
@@ -298,8 +303,8 @@ def _judged(now: dict[str, Figure], then: dict[str, Figure]) -> Iterator[str]:
     def both(name: str) -> bool:
         return bool(now[name].value is not None and name in then and then[name].value)
 
-    if both("friction_pa"):
-        yield "friction_pa"
+    if both("friction_at_rate_pa"):
+        yield "friction_at_rate_pa"
     elif both("breakout_pa") and both("command_pa"):
         before, after = then["command_pa"].value or 0.0, now["command_pa"].value or 0.0
         if abs(after - before) <= SAME_COMMAND * max(abs(before), abs(after)):

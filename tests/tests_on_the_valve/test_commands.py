@@ -86,7 +86,7 @@ def test_a_partial_stroke_is_kept_trended_and_may_claim_its_credit(
     assert [each.kind for each in kept(site)] == ["as_left", ""]
     found = json.loads(told_json.read_text())
     assert (found["test"], found["passed"]) == ("partial stroke test", True)
-    assert found["figures"]["travel_m"]["plus_minus"] is not None
+    assert found["figures"]["reached_m"]["plus_minus"] is not None
     assert main(["pst", str(site), "--travel", "0.9"]) == 2
     assert "--travel: allowed is 0.01 to 0.5 of the stroke, got 0.9" in capsys.readouterr().err
 

@@ -58,10 +58,10 @@ def test_a_sound_valve_passes_and_is_back(initial: Initial, noise: float) -> Non
     held_pa = valve.command_pa()
     outcome = outcome_of(valve)
     assert outcome.verdicts == (V.PASSED,), outcome.summary()
-    travel = outcome.figure("travel_m")
+    travel = outcome.figure("reached_m")
     assert travel.value == pytest.approx(0.1 * STROKE_M, rel=0.15)
     assert valve.command_pa() == held_pa
-    friction = outcome.figure("friction_pa")
+    friction = outcome.figure("friction_at_rate_pa")
     if initial is MIDWAY:
         assert friction.value is None, "twice the friction takes more than the travel: it does not come back by itself"
         assert any("friction holds it" in each for each in outcome.notes)
@@ -187,7 +187,7 @@ def test_records_make_a_trend(reference: Outcome, tmp_path: Path) -> None:
     keep(tmp_path, reference, "as_left", 1e9, {})
     broken = replace(reference, quantities=(), verdicts=(V.BROKEN_OFF,))
     keep(tmp_path, broken, "", 2e9, {})
-    shown = trend(records(tmp_path, TEST), ("breakout_pa", "travel_m"))
+    shown = trend(records(tmp_path, TEST), ("breakout_pa", "reached_m"))
     assert [row[-1] for row in shown.rows] == ["passed", "broken off"]
     assert shown.rows[1][1:3] == ("-", "-")
     json.dumps([list(row) for row in shown.rows])
