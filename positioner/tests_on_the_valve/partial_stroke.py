@@ -230,6 +230,7 @@ def _figures(
         out_pa = Figure(abs(found.command_pa - float(command_pa[begins])), found.plus_minus_pa)
         out_s = Figure(found.time_s - float(time_s[begins]), gap_s)
         within = _time_to(recording, rest, found, asked.travel * stroke_m, gap_s, state)
+    friction = _friction(recording, rest, travel, state)
     after = rest_after(recording)
     unrested = undetermined("broken off, or too few samples of the rest after it")
     off = unrested
