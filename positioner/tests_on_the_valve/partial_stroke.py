@@ -243,12 +243,7 @@ def _figures(
         Quantity("breakout_s", "time to the break-out", "s", out_s),
         Quantity("reached_m", "travel reached", "m", travel, asked.travel * stroke_m),
         Quantity("stroke_s", "time from the break-out to the travel", "s", within),
-        Quantity(
-            "friction_at_rate_pa",
-            "friction over the area, lag and all",
-            "Pa",
-            _friction(recording, rest, travel, state),
-        ),
+        Quantity("friction_at_rate_pa", "friction over the area, lag and all", "Pa", friction),
         Quantity("back_m", "back at, from where it was", "m", off),
         Quantity("noise_m", "noise at rest", "m", Figure(rest.noise_m)),
     ]
