@@ -3,10 +3,11 @@
     python -m benchmarks.many_valves [--valves 64 --rate-hz 100] [--seconds 20]
 
 The devices are one process, which answers the shipped map from words that count up, so that nearly all that is used of
-the processors is the daemon's. Figures: periods missed, per cent; processor time a cycle, us; the share of one
-processor that the daemon took, whose interpreter can use one; and what all others on the machine took meanwhile, the
-devices among them, in processors. Where that is much, periods are missed by it, and a cycle is dearer, whose caches
-are not its own. Each valve is in mode hold: the cost of standing by.
+the processors is the daemon's. Figures: periods missed, per cent; processor time a cycle, us, and how many times that
+of one on a device in memory, by which `doctor` says how many valves fit; the share of one processor that the daemon
+took, whose interpreter can use one; and what all others on the machine took meanwhile, the devices among them, in
+processors. Where that is much, periods are missed by it, and a cycle is dearer, whose caches are not its own. Each
+valve is in mode hold: the cost of standing by.
 """
 
 import argparse
@@ -26,9 +27,11 @@ from pathlib import Path
 import psutil
 
 from config.codes import Fault
+from config.daemon_file import load_valves
 from config.modbus_map import SIMULATED_MAP
 from fieldbus.modbus.layout import layout
 from positioner.cli.parts.children import port_in
+from positioner.daemon.cycle_load import in_memory_s
 from positioner.dcs import Dcs
 
 GOALS = ((200, 10.0), (64, 100.0))
@@ -100,7 +103,7 @@ class Devices:
 def report(goals: Sequence[tuple[int, float]] = GOALS, seconds: float = SECONDS) -> list[str]:
     """Return a line for each number of valves and rate."""
     lines = [
-        f"{'valves':>6}{'Hz':>6}{'missed %':>10}{'us a cycle':>12}{'processor %':>13}{'threads':>9}"
+        f"{'valves':>6}{'Hz':>6}{'missed %':>10}{'us a cycle':>12}{'in memory':>11}{'processor %':>13}{'threads':>9}"
         f"{'ends after s':>14}{'others load':>13}  faults"
     ]
     for valves, rate_hz in goals:
@@ -129,6 +132,7 @@ def measured(valves: int, rate_hz: float, seconds: float) -> str:
             raise RuntimeError(Path(folder, "log").read_text())
         port = port_in(said.strip())
         time.sleep(WARM_UP_S)
+        alone_s = in_memory_s(load_valves(file)[0])
         process, units = psutil.Process(daemon.pid), range(1, valves + 1)
         before, used_s, begun_s, all_s = _seen(port, units), _used_s(process), time.monotonic(), _machine_s()
         time.sleep(seconds)
@@ -145,7 +149,8 @@ def measured(valves: int, rate_hz: float, seconds: float) -> str:
     faults = Counter(Fault(int(each["fault"])) for each in after)
     said = ", ".join(f"{count} {fault.name}" for fault, count in faults.items() if fault is not Fault.NONE) or "none"
     return (
-        f"{valves:6}{rate_hz:6g}{100 * missed:10.2f}{1e6 * used_s / cycles:12.0f}{100 * used_s / took_s:13.0f}"
+        f"{valves:6}{rate_hz:6g}{100 * missed:10.2f}{1e6 * used_s / cycles:12.0f}{used_s / cycles / alone_s:11.1f}"
+        f"{100 * used_s / took_s:13.0f}"
         f"{threads:9}{ended_s:14.2f}{(all_s - used_s) / took_s:13.2f}  {said}"
     )
 

@@ -1,7 +1,7 @@
 """`positioner doctor`: checks the installation, a daemon's file, its bus, timing and permissions, a line each."""
 
 import argparse
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from functools import partial
 from pathlib import Path
 from typing import TYPE_CHECKING
@@ -62,6 +62,7 @@ def run(arguments: argparse.Namespace) -> int:
         *((name, check, files[0]) for name, check in (("system", _system), ("priority", _priority))),
         *(("certificates", _certificates, file) for file in files),
     ]
+    well = _passes("load", "", partial(_load, files)) and well
     for name, check, file in checks:
         valve = f"{file.valve.name}: " if len(files) > 1 and name in ("law", "bus", "sampling", "recorder") else ""
         well = _passes(name, valve, partial(check, file, path)) and well
@@ -84,6 +85,17 @@ def _packages() -> str:
     if said := in_the_way() or sharing():
         raise FailedCheck(said)
     return f"{', '.join(OWN)} are positioner's own, in {HOME}"
+
+
+def _load(files: "Sequence[DaemonFile]") -> str:
+    from positioner.daemon.cycle_load import cycle_load
+
+    load = cycle_load(files)
+    if load is None:
+        return "in lockstep: the devices wait for the daemon"
+    if not load.fits:
+        raise FailedCheck(load.said)
+    return load.said
 
 
 def _law(file: "DaemonFile", config: Path) -> str:

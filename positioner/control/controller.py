@@ -8,6 +8,7 @@ too, and what is to be refined is left in the memory for `Controller`, which kee
 
 from dataclasses import replace
 from math import isfinite
+from operator import is_
 from typing import NamedTuple
 
 from config.codes import (
@@ -62,6 +63,8 @@ from positioner.estimation.online import Identification
 from positioner.estimation.refiner import Refinement, Refiner
 
 NOTHING_FOUND = Refinement()
+NOT_READY = int(DeviceStatus.NOT_READY)
+"""A flag of the enumeration costs as much as half a law."""
 FOLLOWING = (S1, S2)
 """The states in which the law commands."""
 
@@ -274,7 +277,7 @@ def step(
         inhibit_reason=inhibit_reason,
         reference_m=reference.value_m,
         delta_r_m=reference.delta_m,
-        sample_age_s=sample.now_s - supervision.good_s,
+        sample_age_s=0.0 if now.stem_m is not None else sample.now_s - supervision.good_s,
         estimates=estimates_tested(excitation, memory.identification, memory.statics),
         applied=applied,
         static_law=memory.statics.law,
@@ -286,6 +289,8 @@ def step(
         dead_band_m=dead_band_m,
         one_direction=one_direction,
     )
+    if all(map(is_, decision, memory.last)):  # whoever follows decisions sees at once that nothing has changed
+        decision = memory.last
     return memory_of(
         last=decision,
         wanted_pa=commanded.wanted_pa,
@@ -641,7 +646,7 @@ def _held_pa(now: Now, state: State, supervision: SupervisionMemory, law: Law) -
     if supervision.fault:
         if sample.held_pa is not None:
             return sample.held_pa
-        if sample.quality is Quality.GOOD and sample.status & DeviceStatus.NOT_READY:
+        if sample.quality is Quality.GOOD and sample.status & NOT_READY:
             return sample.pressure_pa
     if state is S3 or memory.last.state is S3:
         return memory.held_pa

@@ -1,12 +1,12 @@
 """One measurement, as the control core takes it. Time comes in as data."""
 
-from dataclasses import dataclass
+from typing import NamedTuple
 
 from config.codes import Quality
+from positioner.control.records import by_name
 
 
-@dataclass(frozen=True, slots=True)
-class Sample:
+class Sample(NamedTuple):
     """What one cycle knows of the valve. After a lost reply the last values stand, with quality LOST."""
 
     now_s: float
@@ -28,3 +28,6 @@ class Sample:
     """The device's own code of what is wrong with it (CANopen: of its last EMCY); 0: nothing."""
     unattended_s: float = 0.0
     """For how long the daemon had not commanded the device, where that was too long; 0 otherwise."""
+
+
+sample_of = by_name(Sample)

@@ -5,6 +5,7 @@ own. They meet only in immutable snapshots that are replaced whole: the cycle wa
 
     service, ending               assembles it from its file, starts and ends it; what ends it
     cycle, pacing, link           one cycle, when it begins, and the driver with its connection
+    cycle_load                    what the cycles of all valves cost, and how many fit
     first_look                    whether a device's numbers can be what the file takes them for
     backoff                       when to try again what failed, and what to say of it
     snapshot                      what a cycle leaves for the others

@@ -78,11 +78,15 @@ class Cycle:
 
     def once(self) -> None:
         """Run one cycle."""
-        before, self.snapshot = self.snapshot, self._decide()
-        if _logged_fields(before.decision) != _logged_fields(self.snapshot.decision):
-            _log_decision(self.snapshot.decision)
+        before = self.snapshot.decision
+        self.snapshot = self._decide()
+        decision = self.snapshot.decision
+        if decision is before:
+            return
+        if _logged_fields(before) != _logged_fields(decision):
+            _log_decision(decision)
         if self.history is not None:
-            self.history.enter(before.decision, self.snapshot.decision)
+            self.history.enter(before, decision)
 
     def _decide(self) -> Snapshot:
         sent_pa = self._controller.command_pa

@@ -18,14 +18,14 @@ shows none, the command counts: in lockstep the one just sent, under which a per
 import logging
 import math
 import time
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 
 from config.codes import Quality
 from config.daemon_file import DaemonFile
 from config.quantities import ActionName, DeviceStatus
 from config.travel import Travel
 from drivers.boundary import Driver, DriverError, KeepsSettings, NoNumber, NoReply, Reading, ReadsBack, Refused
-from positioner.control.sample import Sample
+from positioner.control.sample import Sample, sample_of
 from positioner.daemon.backoff import Backoff, Sayings
 from positioner.daemon.logs import log_event
 from positioner.daemon.pacing import Pace
@@ -113,6 +113,9 @@ class Link:
     def __init__(self, driver: Driver, pace: Pace, settings: LinkSettings | None = None) -> None:
         self.counts = LinkCounts()
         self._driver = driver
+        # Asking what a driver can do takes a tenth of a cycle.
+        self._reads_back = driver if isinstance(driver, ReadsBack) else None
+        self._keeps_settings = driver if isinstance(driver, KeepsSettings) else None
         self._pace = pace
         self._settings = settings or LinkSettings()
         self._longest_unattended_s = self._settings.longest_unattended_s
@@ -137,7 +140,7 @@ class Link:
         self._asked_s = math.inf
         """When the exchange under way began."""
         self._reading: Reading | None = None
-        self._sample = Sample(0.0, 0.0, math.nan, math.nan, Quality.LOST)
+        self._sample = Sample(now_s=0.0, time_s=0.0, position_m=math.nan, pressure_pa=math.nan, quality=Quality.LOST)
 
     def open(self) -> tuple[float, Reading]:
         """Connect for the first time; return the command in force in the device, in Pa, and a first reading.
@@ -176,7 +179,7 @@ class Link:
             if held_pa is not None:
                 self._commanded_s = now_s
                 sample = self._fresh(self._driver.read(), held_pa)
-                self._sample = replace(sample, held_pa=held_pa, overwritten=True)
+                self._sample = sample._replace(held_pa=held_pa, overwritten=True)
             elif self._connected:
                 self._commanded_s = now_s
                 told_pa, self._told_pa = self._told_pa, None
@@ -250,14 +253,15 @@ class Link:
 
     def _overwritten_pa(self) -> float | None:
         """Return what the device holds, if it is time to ask, and it is not what it was told."""
-        every_s, told_pa, driver = self._settings.read_back_s, self._told_pa, self._driver
+        every_s, told_pa, driver = self._settings.read_back_s, self._told_pa, self._reads_back
         now_s = self._sample.now_s
-        if every_s == 0 or told_pa is None or now_s - self._read_back_s < every_s or not isinstance(driver, ReadsBack):
+        if every_s == 0 or told_pa is None or now_s - self._read_back_s < every_s or driver is None:
             return None
         self._read_back_s = now_s
         self._read_backs += 1
-        if self._read_backs % SETTINGS_EVERY == 0 and isinstance(driver, KeepsSettings) and driver.has_settings:
-            self._require_settings(driver)
+        settings = self._keeps_settings
+        if self._read_backs % SETTINGS_EVERY == 0 and settings is not None and settings.has_settings:
+            self._require_settings(settings)
             return None
         held_pa = driver.held_pa()
         if abs(held_pa - told_pa) <= self._settings.read_back_tolerance_pa:
@@ -281,8 +285,7 @@ class Link:
         held_pa = self._in_force_pa(set_point_pa, reading)
         before, self._reading = self._reading, None
         self._told_pa = self._pressure_pa = None
-        sample = replace(
-            self._fresh(reading, held_pa),
+        sample = self._fresh(reading, held_pa)._replace(
             held_pa=held_pa,
             unattended_s=self._unattended_s,
             restarted=self._restarted,
@@ -291,7 +294,7 @@ class Link:
         self._commanded_s = awake_s()
         self._say_found(held_pa, reading.status)
         repeated = before is not None and _same_sample(before, reading)
-        return replace(sample, quality=Quality.REPEATED) if repeated else sample
+        return sample._replace(quality=Quality.REPEATED) if repeated else sample
 
     def _say_found(self, held_pa: float, status: int) -> None:
         """Say that the device is there: it is back, or was never reached before, or was but set up for long."""
@@ -325,7 +328,7 @@ class Link:
         self._was_away = True
         self._sample = self._lost()
         if isinstance(error, NoNumber):
-            self._sample = replace(self._sample, quality=Quality.NO_NUMBER)
+            self._sample = self._sample._replace(quality=Quality.NO_NUMBER)
         refused = isinstance(error, Refused)
         if self._connected and (isinstance(error, NoNumber) or (refused and self._refusals < MOST_REFUSALS)):
             self._refusals += refused
@@ -337,8 +340,7 @@ class Link:
 
     def _lost(self) -> Sample:
         now_s = self._pace.now_s(None)
-        return replace(
-            self._sample,
+        return self._sample._replace(
             now_s=now_s,
             quality=Quality.LOST,
             held_pa=None,
@@ -359,7 +361,7 @@ class Link:
         now_s, travel = self._pace.now_s(reading.device_time_s), self._settings.travel
         repeated = self._count(reading)
         self._reading = reading
-        return Sample(
+        return sample_of(
             now_s=now_s,
             time_s=now_s if reading.device_time_s is None else reading.device_time_s,
             position_m=reading.position_m if travel is None else travel.turned_m(reading.position_m),
@@ -381,14 +383,15 @@ class Link:
 
     def _began_anew(self, reading: Reading) -> bool:
         """Return whether the device's clock, or a long counter, runs from its beginning again: then it is looked at."""
-        before, counted = self._reading, self._driver.capabilities.counter_range
+        before = self._reading
         if before is None:
             return False
         if reading.device_time_s is not None and before.device_time_s is not None:
             return reading.device_time_s < before.device_time_s
-        if reading.sample_counter is None or before.sample_counter is None or counted < LONG_COUNTER:
+        if reading.sample_counter is None or before.sample_counter is None:
             return False
-        return (reading.sample_counter - before.sample_counter) % counted > counted // 2
+        counted = self._driver.capabilities.counter_range
+        return counted >= LONG_COUNTER and (reading.sample_counter - before.sample_counter) % counted > counted // 2
 
     def _count(self, reading: Reading) -> bool:
         """Count the samples that were missed; return whether this one came before."""
@@ -396,7 +399,9 @@ class Link:
         if before is None:
             return False
         if reading.sample_counter is not None and before.sample_counter is not None:
-            passed = (reading.sample_counter - before.sample_counter) % self._driver.capabilities.counter_range
+            passed = reading.sample_counter - before.sample_counter
+            if passed < 0:  # it began at 0 again
+                passed %= self._driver.capabilities.counter_range
             self.counts.lost_samples += max(passed - 1, 0)
             return passed == 0
         return _same_sample(before, reading)

@@ -32,6 +32,7 @@ from positioner.control.settings import Settings
 from positioner.control.travel.signal_path import SignalPath
 from positioner.daemon.alarms.alarm_list import AlarmList
 from positioner.daemon.cycle import Cycle, run_in_turn
+from positioner.daemon.cycle_load import IMPOSSIBLE, cycle_load
 from positioner.daemon.ending import Endings
 from positioner.daemon.first_look import impossible
 from positioner.daemon.health import Health, HealthKeeper, HealthSettings, StoredHealth, ne107_condition
@@ -128,6 +129,7 @@ def serve(files: Sequence[DaemonFile], source: Path, extended: Sequence[Extended
         on_exit.callback(start_logging(files[0].log.level).stop)
         if lacks := goes_without():
             log_event(log, logging.WARNING, "cycles are less punctual on this system", without=lacks)
+        _refuse_overload(files, source)
         refinement = RefinementProcess()
         on_exit.callback(refinement.stop)
         history = HistoryKeeper(files[0].history, source.parent)
@@ -162,6 +164,20 @@ def serve(files: Sequence[DaemonFile], source: Path, extended: Sequence[Extended
             _leave(valves)
         log_event(log, logging.INFO, "stopped", status=endings.status, reason=endings.reason)
     return endings.status
+
+
+def _refuse_overload(files: Sequence[DaemonFile], source: Path) -> None:
+    """Refuse valves whose cycles no such machine can run; warn of those that it cannot run in time.
+
+    Raises:
+        InputError: they need much more than there is.
+    """
+    load = cycle_load(files)
+    if load is None or load.fits:
+        return
+    if load.share > IMPOSSIBLE:
+        raise InputError(str(source), load.said)
+    log_event(log, logging.WARNING, "the valves need more than there is", load=load.said)
 
 
 def _assembled(

@@ -21,4 +21,4 @@ class Snapshot:
         """Return what is true where no cycle has come since for too long: what the next will find, a stall."""
         decision = self.decision
         found = decision._replace(fault=decision.fault or Fault.STALLED)
-        return replace(self, sample=replace(self.sample, quality=Quality.LOST), decision=found)
+        return replace(self, sample=self.sample._replace(quality=Quality.LOST), decision=found)

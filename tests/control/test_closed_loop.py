@@ -112,19 +112,19 @@ Spoil = Callable[[int, Sample], Sample]
 
 
 def spiked(index: int, sample: Sample) -> Sample:
-    return replace(sample, position_m=5.0 if index % 50 == 25 else sample.position_m)
+    return sample._replace(position_m=5.0 if index % 50 == 25 else sample.position_m)
 
 
 def dropped(index: int, sample: Sample) -> Sample:
-    return replace(sample, quality=Quality.LOST, position_m=math.nan) if index % 50 == 25 else sample
+    return sample._replace(quality=Quality.LOST, position_m=math.nan) if index % 50 == 25 else sample
 
 
 def repeated(index: int, sample: Sample) -> Sample:
-    return replace(sample, quality=Quality.REPEATED, position_m=0.0) if index % 50 == 25 else sample
+    return sample._replace(quality=Quality.REPEATED, position_m=0.0) if index % 50 == 25 else sample
 
 
 def interrupted(index: int, sample: Sample) -> Sample:
-    return replace(sample, quality=Quality.LOST, position_m=math.nan) if 300 <= index < 330 else sample
+    return sample._replace(quality=Quality.LOST, position_m=math.nan) if 300 <= index < 330 else sample
 
 
 @pytest.mark.parametrize("spoil", few_always([spiked, interrupted, dropped, repeated], 2))

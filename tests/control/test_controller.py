@@ -50,7 +50,7 @@ class Bench:
         """Run one cycle of 10 ms."""
         self.now_s += 0.01
         seen = Sample(self.now_s, self.now_s, self.position_m, self.controller.command_pa)
-        return self.controller.step(replace(seen, **sample), self.requests)  # type: ignore[arg-type]
+        return self.controller.step(seen._replace(**sample), self.requests)  # type: ignore[arg-type]
 
 
 @pytest.fixture

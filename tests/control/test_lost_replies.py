@@ -111,9 +111,9 @@ class Slide:
         self.step(*self.samples(1.0, here_m))
         self.requests = replace(self.requests, manual_pa=60e3, manual_writes=1)
         self.step(*self.samples(PERIOD_S, here_m))
-        self.step(*(replace(sample, quality=Quality.LOST) for sample in self.samples(PERIOD_S, here_m)))
+        self.step(*(sample._replace(quality=Quality.LOST) for sample in self.samples(PERIOD_S, here_m)))
         for sample in self.samples(PERIOD_S, here_m):
-            self.step(replace(sample, held_pa=held_pa, unattended_s=unattended_s))
+            self.step(sample._replace(held_pa=held_pa, unattended_s=unattended_s))
         self.step(*self.samples(3.0, there_m))
         return self.outcomes
 

@@ -82,7 +82,7 @@ def spoilt(given: Inputs, rng: np.random.Generator) -> Inputs:
     """Another future: lost replies, another position, a stem that jumps, a mode that is written."""
     return [
         (
-            replace(sample, position_m=sample.position_m + rng.normal(0.0, 1e-3), quality=rng.choice(list(Quality))),
+            sample._replace(position_m=sample.position_m + rng.normal(0.0, 1e-3), quality=rng.choice(list(Quality))),
             replace(requests, eta=(0, 0, 0) if rng.random() < 0.2 else QUIET),
         )
         for sample, requests in given

@@ -206,7 +206,7 @@ def test_what_a_device_did_by_itself_is_no_landing_and_drops_nothing(told: dict[
         for n in range(120):
             now_s = clock[0] = clock[0] + 0.01
             seen = Sample(now_s, now_s, position_m + 1e-6 * (n % 3), controller.command_pa)
-            decision = controller.step(replace(seen, **sample) if n == 0 else seen, requests)
+            decision = controller.step(seen._replace(**sample) if n == 0 else seen, requests)
         return decision
 
     clock = [0.0]

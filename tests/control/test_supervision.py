@@ -52,24 +52,24 @@ def test_good_samples_raise_nothing_and_the_mode_is_taken_up() -> None:
 
 
 def test_the_third_lost_reply_in_a_row_is_a_fault_and_the_mode_falls() -> None:
-    lost = [replace(good(0.01 * n), quality=Quality.LOST) for n in range(1, 4)]
+    lost = [good(0.01 * n)._replace(quality=Quality.LOST) for n in range(1, 4)]
     watches = watched([good(0.0), *lost], AUTOMATIC)
     assert faults(watches) == [Fault.NONE, Fault.NONE, Fault.NONE, Fault.NO_REPLY]
     assert watches[-1].mode is Mode.HOLD
 
 
 def test_a_dead_line_that_is_slower_than_staleness_is_no_reply() -> None:
-    lost = [replace(good(0.0), now_s=2.0 * n, quality=Quality.LOST) for n in range(1, 3)]
+    lost = [good(0.0)._replace(now_s=2.0 * n, quality=Quality.LOST) for n in range(1, 3)]
     assert faults(watched([good(0.0), *lost], AUTOMATIC))[1] is Fault.NO_REPLY
 
 
 def test_two_lost_replies_with_a_good_one_between_are_none() -> None:
-    lost = replace(good(0.01), quality=Quality.LOST)
+    lost = good(0.01)._replace(quality=Quality.LOST)
     assert faults(watched([good(0.0), lost, lost, good(0.03), lost, lost], AUTOMATIC)) == [Fault.NONE] * 6
 
 
 def test_repeated_samples_turn_stale() -> None:
-    repeated = [replace(good(0.0), now_s=0.03 * n, quality=Quality.REPEATED) for n in range(1, 5)]
+    repeated = [good(0.0)._replace(now_s=0.03 * n, quality=Quality.REPEATED) for n in range(1, 5)]
     assert faults(watched([good(0.0), *repeated], AUTOMATIC))[-2:] == [Fault.NONE, Fault.STALE]
 
 
@@ -81,23 +81,23 @@ def test_an_impossible_position_counts_as_no_measurement(position_m: float) -> N
 
 @pytest.mark.parametrize("status", list(DeviceStatus))
 def test_an_unfit_device_is_a_fault_at_once(status: DeviceStatus) -> None:
-    assert faults(watched([replace(good(0.0), status=status)], AUTOMATIC)) == [Fault.DEVICE]
+    assert faults(watched([good(0.0)._replace(status=status)], AUTOMATIC)) == [Fault.DEVICE]
 
 
 @pytest.mark.parametrize(("held_pa", "fault"), [(50e3, Fault.NONE), (50.3e3, Fault.NONE), (0.0, Fault.RESTARTED)])
 def test_a_device_that_comes_back_with_another_command_was_restarted(held_pa: float, fault: Fault) -> None:
-    assert faults(watched([replace(good(0.0), held_pa=held_pa)], AUTOMATIC)) == [fault]
+    assert faults(watched([good(0.0)._replace(held_pa=held_pa)], AUTOMATIC)) == [fault]
 
 
 def test_a_daemon_that_stood_still_is_a_fault_whatever_the_device_says() -> None:
-    late = replace(good(0.01), unattended_s=2.0, held_pa=0.0, status=DeviceStatus.COMMUNICATION_LOST)
+    late = good(0.01)._replace(unattended_s=2.0, held_pa=0.0, status=DeviceStatus.COMMUNICATION_LOST)
     watches = watched([good(0.0), late], AUTOMATIC)
     assert faults(watches) == [Fault.NONE, Fault.STALLED]
     assert watches[-1].mode is Mode.HOLD
 
 
 def test_a_measurement_that_is_no_number_is_implausible() -> None:
-    none = [replace(good(0.01 * n), quality=Quality.NO_NUMBER) for n in range(1, 4)]
+    none = [good(0.01 * n)._replace(quality=Quality.NO_NUMBER) for n in range(1, 4)]
     assert faults(watched([good(0.0), *none], AUTOMATIC))[-2:] == [Fault.NONE, Fault.IMPLAUSIBLE]
 
 
@@ -105,9 +105,9 @@ def after_a_new_command(lost: int) -> Fault:
     """Return the fault after replies were lost from a new command on, and the device comes back with the one before."""
     memory = supervise(SupervisionMemory(), good(0.0), 50e3, AUTOMATIC, LIMITS, good=True)
     for n in range(1, lost + 1):
-        lost_reply = replace(good(0.0), now_s=PERIOD_S * n, quality=Quality.LOST)
+        lost_reply = good(0.0)._replace(now_s=PERIOD_S * n, quality=Quality.LOST)
         memory = supervise(memory, lost_reply, 60e3, AUTOMATIC, LIMITS, good=False)
-    back = replace(good(PERIOD_S * (lost + 1)), held_pa=50e3)
+    back = good(PERIOD_S * (lost + 1))._replace(held_pa=50e3)
     return supervise(memory, back, 60e3, AUTOMATIC, LIMITS, good=True).fault
 
 
@@ -121,9 +121,9 @@ def test_a_device_that_was_away_for_longer_was() -> None:
 
 
 def test_a_fault_stays_until_acknowledged_after_its_cause_is_gone() -> None:
-    unfit = replace(good(0.0), status=DeviceStatus.NOT_READY)
+    unfit = good(0.0)._replace(status=DeviceStatus.NOT_READY)
     acknowledged = replace(AUTOMATIC, acknowledgements=1)
-    early = watched([unfit, replace(unfit, now_s=0.01)], acknowledged)
+    early = watched([unfit, unfit._replace(now_s=0.01)], acknowledged)
     assert faults(early) == [Fault.DEVICE, Fault.DEVICE]
     late = watched([good(0.02)], acknowledged, early[-1])
     assert faults(late) == [Fault.DEVICE], "one acknowledgement is used up once"
@@ -133,7 +133,7 @@ def test_a_fault_stays_until_acknowledged_after_its_cause_is_gone() -> None:
 
 
 def test_a_mode_asked_for_during_a_fault_is_not_taken_up_later() -> None:
-    unfit = replace(good(0.0), status=DeviceStatus.NOT_READY)
+    unfit = good(0.0)._replace(status=DeviceStatus.NOT_READY)
     memory = watched([unfit], AUTOMATIC)[-1]
     memory = watched([good(0.01)], replace(AUTOMATIC, mode_writes=2), memory)[-1]
     memory = watched([good(0.02)], replace(AUTOMATIC, mode_writes=2, acknowledgements=1), memory)[-1]
@@ -155,6 +155,6 @@ def test_each_fault_has_its_action() -> None:
 def test_a_reply_that_is_lost_while_the_sensor_says_nonsense_is_no_silence_of_the_device() -> None:
     """Each has an action of its own, and one reply lost is no fault."""
     nonsense = [good(PERIOD_S * n, position_m=9.0) for n in range(1, 5)]
-    lost = [replace(good(PERIOD_S * n), quality=Quality.LOST) for n in range(5, 8)]
+    lost = [good(PERIOD_S * n)._replace(quality=Quality.LOST) for n in range(5, 8)]
     found = faults(watched([good(0.0), *nonsense, *lost], AUTOMATIC))
     assert found[3:] == [*[Fault.IMPLAUSIBLE] * 4, Fault.NO_REPLY], "three in a row are one"

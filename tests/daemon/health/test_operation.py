@@ -32,7 +32,7 @@ def test_each_second_is_counted_once_and_a_month_is_kept() -> None:
     decision = decision._replace(reference_m=0.5 * STROKE_M, command_pa=50e3)
     for day in range(DAYS + 9):
         for second, opening in enumerate((0.5, 0.52, 0.52, 0.56, nan, -0.01, 1.01)):
-            seen = replace(sample, position_m=opening * STROKE_M)
+            seen = sample._replace(position_m=opening * STROKE_M)
             operation.look(seen, decision, NOT_TURNED, 86400.0 * day + second)
     assert len(operation.days) == DAYS
     today = operation.today
@@ -47,7 +47,7 @@ def test_ends_are_those_of_the_valve_whatever_air_does(closes: bool) -> None:
     travel = Travel(STROKE_M, closes)
     operation = Operation(travel, RANGE_PA)
     for cut_off, opening in ((HIGH if closes else LOW, 0.002), (LOW if closes else HIGH, 0.998)):
-        seen = replace(sample, position_m=travel.stem_m(opening))
+        seen = sample._replace(position_m=travel.stem_m(opening))
         operation.look(seen, decision._replace(cut_off=cut_off), NOT_TURNED, 0.0)
     assert (operation.today.shut.value, operation.today.opened.value) == pytest.approx((0.002, 0.998))
     assert operation.today.saturated == 0
@@ -59,7 +59,7 @@ def test_a_command_at_its_limit_a_leak_a_poor_supply_and_a_stem_beside_its_cours
     ratios = Ratios(-1e6, -2e4)
     applied = replace(decision.applied, ratios=ratios)
     for command_pa, short_pa in ((60e3, 4e3), (60e3, 4e3), (190e3, 30e3), (190e3, 30e3)):
-        seen = replace(sample, position_m=0.06, pressure_pa=command_pa - short_pa)
+        seen = sample._replace(position_m=0.06, pressure_pa=command_pa - short_pa)
         now = decision._replace(command_pa=command_pa, applied=applied)
         operation.look(seen, now, NOT_TURNED, 0.0)
     today = operation.today

@@ -293,7 +293,7 @@ def test_a_stem_that_does_not_go_onto_its_stop_is_out_of_specification(
     panel, sample, decision = in_automatic()
     shut = decision._replace(inhibit_reason=InhibitReason.CUT_OFF, reference_m=0.009 * STROKE_M, cut_off=LOW)
     for now_s in (sample.now_s, sample.now_s + passed_s):
-        panel.health.enter(replace(sample, now_s=now_s, position_m=stem * STROKE_M), shut, panel.cycle.requests)
+        panel.health.enter(sample._replace(now_s=now_s, position_m=stem * STROKE_M), shut, panel.cycle.requests)
     assert ne107_condition(shut, panel.health).causes == causes
 
 
