@@ -225,7 +225,8 @@ class Refusal(Code):
     MODEL_DOES_NOT_FIT = (
         20,
         "the motion is not that of the model, whether device.sampling is before or after: the residuals outweigh the "
-        "sensor's noise; or the pressure moves between samples (identification.pressure_held)",
+        "sensor's noise; or a part of the record contradicts the rest: a sensor that jumped; or the pressure "
+        "moves between samples (identification.pressure_held)",
     )
     LANDINGS_TOO_FEW = 21, "too few slides have ended in rest, or all in one direction"
     LANDINGS_NOT_STRAIGHT = 22, "the landings lie on no straight line: spring or friction change over the travel"

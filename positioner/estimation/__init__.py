@@ -9,6 +9,7 @@ time comes in with the samples.
     motion_detector, running_noise                  does the stem move; the noise of its sensor
     recording_estimates, batch                      from a whole recording: find its motions, fit them, check the fit
     segmentation, motion_segment                    the motions in a record; one of them
+    record_consistency                              is the whole record that of the valve fitted to a part of it
     likelihood, likelihood_search                   the fit by maximum likelihood: result and search
     motion_preparation, linear_problem              its rows and its least squares
     stem_response, array                            the stem's exact response, which is fitted; the type of all arrays

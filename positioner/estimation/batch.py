@@ -46,7 +46,8 @@ from positioner.estimation.likelihood import LikelihoodFit, fit_motions
 from positioner.estimation.linear_problem import Prior
 from positioner.estimation.motion_preparation import CLEAR
 from positioner.estimation.motion_segment import MotionSegment
-from positioner.estimation.segmentation import Segmentation, find_motions
+from positioner.estimation.record_consistency import contradicts
+from positioner.estimation.segmentation import Segmentation, find_motions, whole_stretch
 
 MOST_STRETCHES = 8
 """The farthest motions of a record are fitted together; more add little and cost much."""
@@ -118,6 +119,7 @@ class BatchResult(Brief):
         segments: how many motions were fitted.
         left_out: how many were found and not fitted.
         condition: of the information matrix of (ln τ, ln μ, ln g, ln q), scaled to a unit diagonal.
+        contradicted: whether the rest of the record contradicts the fit.
     """
 
     estimates: Estimates
@@ -129,6 +131,7 @@ class BatchResult(Brief):
     left_out: int
     condition: float
     sampling: Sampling = Sampling.UNKNOWN
+    contradicted: bool = False
 
 
 def identify(
@@ -167,7 +170,9 @@ def identify(
     others = [each.fit for each in hypotheses if each.interpolation != best.interpolation]
     told_apart = all(_clearly_better(best.fit, each) for each in others)
     open_std = _open_std(best.fit, others) if settings.sampling else np.zeros(6)
-    estimates = _estimates(best, noise_std_m, settings, float(t[-1]), open_std)
+    stamps_s = even_s if best.evened and even_s is not None else t
+    contradicted = _contradicted(best, stamps_s, x, noise_std_m, settings)
+    estimates = _estimates(best, noise_std_m, settings, float(t[-1]), open_std, contradicted=contradicted)
     return BatchResult(
         estimates=replace(estimates, breakaway=_breakaway(best, estimates, settings.largest_relative_std)),
         fit=best.fit,
@@ -178,6 +183,7 @@ def identify(
         left_out=best.segmentation.too_short + len(best.segmentation.segments) - len(best.chosen),
         condition=condition(best.fit),
         sampling=_SAMPLING[best.interpolation] if settings.sampling and told_apart else Sampling.UNKNOWN,
+        contradicted=contradicted,
     )
 
 
@@ -302,6 +308,33 @@ def _preload_explains_as_well(best: _Hypothesis, noise_std_m: float | None, sett
     return apart > max(APART * std, settings.largest_relative_std * abs(float(best.fit.p[2])))
 
 
+def _contradicted(
+    best: _Hypothesis,
+    t: Array,
+    x: Array,
+    noise_std_m: float | None,
+    settings: BatchSettings,
+) -> bool:
+    """Return whether the rest of the record contradicts the fit: a sensor that jumped."""
+    fit = best.fit
+    if fit is None:
+        return False
+    held, allowed_m = best.interpolation != "linear", _allowed_m(best, noise_std_m, settings)
+    residual_m = max(fit.residual_std_m, allowed_m if allowed_m < inf else 0.0)
+    scale_m = UNSEEN * float(np.ptp(x)) if noise_std_m is None else noise_std_m
+    for each in best.segmentation.stretches:
+        begin_s, end_s = t[each.begin], t[each.end - 1]
+        inside = [part for part in best.chosen if begin_s <= part.time_s[-1] and part.time_s[0] <= end_s]
+        if not inside:
+            continue
+        direction = max(inside, key=lambda part: float(np.ptp(part.position_m))).direction
+        threshold = settings.moving_threshold_m_per_s
+        whole = whole_stretch(each, direction, t, x, best.pressure_pa, scale_m, threshold)
+        if whole is not None and contradicts(whole, fit, residual_m, held=held):
+            return True
+    return False
+
+
 def _fitted(
     t: Array,
     x: Array,
@@ -339,7 +372,13 @@ def condition(fit: LikelihoodFit) -> float:
 
 
 def _estimates(
-    best: _Hypothesis, noise_std_m: float | None, settings: BatchSettings, time_s: float, open_std: Array
+    best: _Hypothesis,
+    noise_std_m: float | None,
+    settings: BatchSettings,
+    time_s: float,
+    open_std: Array,
+    *,
+    contradicted: bool,
 ) -> Estimates:
     """Return the estimates of a fit, each valid or with the reason why not."""
     assert best.fit is not None
@@ -351,6 +390,8 @@ def _estimates(
         together = Refusal.MODEL_DOES_NOT_FIT
     elif _preload_explains_as_well(best, noise_std_m, settings):
         together = Refusal.PRELOAD_EXPLAINS_AS_WELL
+    elif contradicted:
+        together = Refusal.MODEL_DOES_NOT_FIT
     unphysical = (
         values[0] > 0 and Refusal.A_POSITIVE,
         values[1] >= 0 and Refusal.B_NOT_NEGATIVE,

@@ -114,6 +114,8 @@ class Identification:
         self._sampling = settings.sampling  # as found out last
         self.moves = 0
         self._rest_in: int | None = None  # samples until a move's rest is long enough
+        self._ended, self._ended_ago = 0, 0  # direction of the last motion if it was too short, samples since it ended
+        self._turned = False  # whether the stem seemed to turn round without a rest: a sensor may have jumped
         self._identifier = Identifier(
             settings.window_s, settings.stroke_m, settings.pressure_pa, pressure_held=settings.pressure_held
         )
@@ -143,6 +145,7 @@ class Identification:
         self._kept = list(self._before)
         self._before.clear()
         self._awaited_since_s = self._rest_in = None
+        self._ended, self._turned = 0, False
         self._relative_variance = inf
         self.estimates = no_estimates(Refusal.WAITING_FOR_MOTION)
 
@@ -277,8 +280,8 @@ class Identification:
             # that act otherwise than was said. A loop in real time, whose commands come into force a little early or
             # late, stays well below.
             gross_m = GROSS * self._settings.stroke_m
-            refused = result.fit is not None and not fits and result.fit.residual_std_m > gross_m
-            refused = refused or self._sampling is not self._settings.sampling
+            gross = result.fit is not None and result.fit.residual_std_m > gross_m
+            refused = self._sampling is not self._settings.sampling or (not fits and (gross or result.contradicted))
             self.estimates = refined if refused else replace(self.estimates, progress=1.0)
 
     def _request(self, parameters: bool, friction: bool) -> None:
@@ -323,14 +326,24 @@ class Identification:
         before = self._motion.direction
         direction = self._motion.update(slope, self._derivatives.slope_gain * noise_m)
         self._age += 1
+        self._ended_ago += 1
         if direction == before:
             return
         if before:
+            unexamined = self._elapsed_s < self._settings.minimum_window_s
+            self._ended, self._ended_ago = before if unexamined else 0, 0
             self._interrupt(Refusal.MOTION_ENDED)
             if self._passive and any(self._requested):
                 self._rest_in = record.length
         if direction:
             self._age = -motion_start(position_m, direction, noise_m)
+            self._turned = self._turned or self._turns_against_the_pressure(direction)
+
+    def _turns_against_the_pressure(self, direction: int) -> bool:
+        """Whether a stem seems to turn round soon after a motion too short to examine, though the pressure does not."""
+        record = self._record
+        soon = direction == -self._ended and self._ended_ago <= 2 * record.length
+        return soon and direction * float(record.pressure_pa[-1] - record.pressure_pa[0]) <= 0.0
 
     def _collect(self) -> None:
         """Use the oldest sample of the record, on its way out."""
@@ -364,6 +377,8 @@ class Identification:
         progress = min(1.0, self._elapsed_s / self._settings.window_s)
         if self._elapsed_s < self._settings.minimum_window_s:
             return replace(no_estimates(Refusal.WINDOW_TOO_SHORT), progress=progress)
+        if self._turned and not self._passive:
+            return replace(no_estimates(Refusal.MODEL_DOES_NOT_FIT), progress=progress)
         a, b, c, b_over_c = self._read_parameters()
         k, k_over_c = self._read_friction()
         directions = Directions(self._motion.direction)

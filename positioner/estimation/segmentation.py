@@ -14,6 +14,7 @@ so cut at the impact, whatever the pressure does afterwards.
 
 from dataclasses import dataclass
 from math import sqrt
+from typing import NamedTuple
 
 import numpy as np
 import numpy.typing as npt
@@ -43,12 +44,23 @@ class Segmentation:
         rests: (begin, end) rows of the rests between them, for what breaks away and what does not.
         too_short: motions that are too short to be fitted.
         moving_share: part of the record's time in motion.
+        stretches: what moves between two rests, a motion each though it seems to turn round; with what follows each.
     """
 
     segments: tuple[MotionSegment, ...]
     rests: tuple[tuple[int, int], ...]
     too_short: int
     moving_share: float
+    stretches: tuple["Stretch", ...] = ()
+
+
+class Stretch(NamedTuple):
+    """Rows of a stretch of motion; the rest before it ends at the first, the one after it lasts until the last."""
+
+    before: int
+    begin: int
+    end: int
+    after: int
 
 
 def find_motions(
@@ -75,7 +87,7 @@ def find_motions(
     for number, (begin, end, direction) in enumerate(found):
         after = found[number + 1][0] if number + 1 < len(found) else len(time_s)
         segment, bounds = _trimmed(
-            time_s, position_m, pressure_pa, (before, begin, end, after), direction, window, noise_std_m
+            time_s, position_m, pressure_pa, Stretch(before, begin, end, after), direction, window, noise_std_m
         )
         if segment is None or _is_broken(segment, period_s):
             too_short += 1
@@ -85,7 +97,41 @@ def find_motions(
         before = bounds[1]
     rests.append((before, len(time_s)))
     moving = sum(end - begin for begin, end, _ in found) / len(time_s)
-    return Segmentation(tuple(segments), tuple(each for each in rests if each[1] > each[0]), too_short, moving)
+    rested = tuple(each for each in rests if each[1] > each[0])
+    return Segmentation(tuple(segments), rested, too_short, moving, _stretches(found, window, len(time_s)))
+
+
+def _stretches(found: list[tuple[int, int, int]], window: int, count: int) -> tuple[Stretch, ...]:
+    """Return the stretches of motions, (begin, end, direction) each, between which there is no rest."""
+    joined: list[list[int]] = []
+    for begin, end, _ in found:
+        if joined and begin - joined[-1][1] <= 2 * window:
+            joined[-1][1] = end
+        else:
+            joined.append([begin, end])
+    ends = [0, *(end for _, end in joined)]
+    begins = [*(begin for begin, _ in joined), count]
+    return tuple(Stretch(ends[at], begin, end, begins[at + 1]) for at, (begin, end) in enumerate(joined))
+
+
+def whole_stretch(
+    stretch: Stretch,
+    direction: int,
+    time_s: Array,
+    position_m: Array,
+    pressure_pa: Array,
+    noise_std_m: float,
+    threshold_m_per_s: float,
+) -> MotionSegment | None:
+    """Return a stretch as one motion in a direction; None where it is too short.
+
+    Args:
+        stretch: of a record.
+        direction: +1 up, -1 down.
+        time_s, position_m, pressure_pa, noise_std_m, threshold_m_per_s: of the record, as of `find_motions`.
+    """
+    window = _window(float(np.median(np.diff(time_s))), noise_std_m, threshold_m_per_s, len(time_s))
+    return _trimmed(time_s, position_m, pressure_pa, stretch, direction, window, noise_std_m)[0]
 
 
 def _window(period_s: float, noise_std_m: float, threshold_m_per_s: float, count: int) -> int:
@@ -142,7 +188,7 @@ def _trimmed(
     time_s: Array,
     position_m: Array,
     pressure_pa: Array,
-    rows: tuple[int, int, int, int],
+    rows: Stretch,
     direction: int,
     window: int,
     noise_std_m: float,
