@@ -2,6 +2,8 @@
 
 from dataclasses import dataclass
 
+from positioner.control.pressure_clamp import clamped
+
 DAY_S = 86400.0
 
 
@@ -75,8 +77,8 @@ class SlideBounds:
     thresholds: SlideThresholds = SlideThresholds()
 
     def allowed_pa(self, pressure_pa: float) -> float:
-        """Return the allowed pressure, Pa, that is nearest to one."""
-        return min(max(pressure_pa, self.minimum_pa), self.maximum_pa)
+        """Return the allowed pressure, Pa, that is nearest to one; NaN of one that is not finite."""
+        return clamped(pressure_pa, self.minimum_pa, self.maximum_pa)
 
     def allows(self, pressure_pa: float) -> bool:
         """Whether a pressure, Pa, is within the limits."""
