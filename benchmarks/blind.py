@@ -33,7 +33,7 @@ from tests.workbench.generators import KINDS, LAWS, case
 from workbench.blind.hiding import VISIBLE, hide
 from workbench.blind.trial import NOISE_M
 from workbench.diagnosis.diagnosis import Diagnosis, diagnose
-from workbench.select.block_errors import indistinguishable
+from workbench.select.effect_candidates import indistinguishable
 from workbench.select.equivalence import algebraic_class
 
 SEEDS: Mapping[str, range] = {
@@ -140,7 +140,7 @@ def _is_equivalent(found: Diagnosis, posed: Problem) -> bool:
     if found.verdict not in NAMES_ALL:
         return False
     itself = diagnose(posed.fit, posed.base, test=posed.test, effects=posed.hidden, workers=1)
-    return indistinguishable(itself.best.errors.all_logs, found.best.errors.all_logs)
+    return indistinguishable(itself.best, found.best)
 
 
 def _missed_m(found: Diagnosis, floor_m: float) -> float:

@@ -41,7 +41,7 @@ from workbench.discriminate.discrimination import (
     Discrimination,
     Played,
     Player,
-    by_run_or_slips,
+    by_design,
     discriminate,
 )
 from workbench.discriminate.experiment_design import Bounds, DesignedExperiment, Terms, courses
@@ -88,7 +88,7 @@ def player(made: Hidden, dirty: bool, seed: int, *, pressure: bool) -> Player:
     return play
 
 
-HOW: dict[str, tuple[Designer, int]] = {"designed": (by_run_or_slips, BUDGET), "menu": (menu, MENU_BUDGET)}
+HOW: dict[str, tuple[Designer, int]] = {"designed": (by_design, BUDGET), "menu": (menu, MENU_BUDGET)}
 
 
 def not_contradicted(fits: Mapping[str, Fit], made: Hidden) -> dict[str, Fit]:
@@ -108,11 +108,8 @@ def line(case: Line, how: Sequence[str], workers: int, *, pressure: bool) -> Lin
     made = hide(case["seed"], dirty=dirty, pressure=pressure)
     recordings = [made.fit, made.test]
     whole = joined(recordings)
-    base = fit(whole, made.base, profile=False, workers=workers)
-    rivals = {
-        name: fit(whole, made.base, effects=(name,), base=base, profile=False, workers=workers)
-        for name in case["sets"][0]
-    }
+    base = fit(whole, made.base, workers=workers)
+    rivals = {name: fit(whole, made.base, effects=(name,), base=base, workers=workers) for name in case["sets"][0]}
     rivals = not_contradicted(rivals, made)
     commands_pa = ready(whole).command_pa
     stroke_m = made.base.valve.stroke_m

@@ -14,9 +14,10 @@ from itertools import product
 import numpy as np
 
 from sim.effect import Effect, first_effects, shipped_effect
-from workbench import fit
 from workbench.blind.hiding import hide
 from workbench.data.held_out import split
+from workbench.fit.fitting import base_fit
+from workbench.fit.problem import problem
 from workbench.select.equivalence import algebraic_class
 from workbench.select.tangent_preview import preview
 
@@ -31,11 +32,12 @@ def places(seeds: Sequence[int], library: Mapping[str, Effect]) -> Iterator[tupl
         hidden = hide(seed, dirty=dirty)
         (effect,) = (each.name for each in hidden.truth.effect)
         parts = split([hidden.fit], hidden.test)
-        base = fit(parts.train.recording, hidden.base, profile=False)
+        of = problem(parts.train.record, hidden.base.valve)
+        base = base_fit(of, hidden.base)
         if effect not in library or parts.floor_m is None or base.rms_m < VISIBLE * parts.floor_m:
             continue
         begun_s = time.perf_counter()
-        ranked = [each.name for each in preview(base, parts, library)]
+        ranked = [each.name for each in preview(base, of, library)]
         took_s = time.perf_counter() - begun_s
         place = 1 + min(ranked.index(each) for each in algebraic_class(effect, library) if each in ranked)
         print(

@@ -107,13 +107,13 @@ def plant_valve() -> Iterator[str]:
         for rows in (slice(half), slice(half, None))
     )
     parts = split([first], second)
-    found = fit(first, PLANT, profile=False)
+    found = fit(first, PLANT)
     errors = block_errors(found, parts)
     per_cent = 100.0 / PLANT.valve.stroke_m
     yield f"  {per_cent * errors.train_rmse_m:.3g} % rms fitted, {per_cent * errors.test_rmse_m:.3g} % held out"
     yield "  " + ", ".join(f"{name} {each.value:.4g}" for name, each in found.parameters.items())
     model = EvaluatedModel(found, errors, parts.floor_m)
-    yield "  " + positioner_or_packing(parts, model, seed=0, workers=os.cpu_count() or 1).sentence
+    yield "  " + positioner_or_packing(parts, model, workers=os.cpu_count() or 1).sentence
 
 
 def forces(found: ForceDiagnosis) -> Iterator[str]:

@@ -1,8 +1,8 @@
-"""Whether a search finds the least error, whatever its draws and the last bits of its input.
+"""Whether a search finds the least error, whatever the last bits of its input.
 
 Each case hides one effect (`workbench.blind.hiding`) and gives its name to the fit. The same record is searched several
-times, with other draws, and with position, command and the start disturbed by 1e-12 of themselves, so that the last
-bits of every sum differ. A search has found the least if its cost is within 1 % of the best search's of its case.
+times, with position, command and the start disturbed by 1e-12 of themselves, so that the last bits of every sum differ.
+A search has found the least if its cost is within 1 % of the best search's of its case.
 
     full    30 s at 100 Hz, all the moves of the generator
     poor    the same records, cut off after their twelfth slip
@@ -35,15 +35,13 @@ from benchmarks.kept_lines import Line, kept, run
 from config.errors import InputError
 from config.recording import Column, Recording
 from config.valve_file import ValveFile, ValveParameters
-from sim.composition import Composition
 from sim.effect import first_effects
 from workbench.blind.hiding import drawn_effects, hide
 from workbench.data.motion import slips
 from workbench.data.record import ready
 from workbench.data.stretches import informative
-from workbench.fit.fitting import fit
-from workbench.fit.objective import SimulationError
-from workbench.model.free_run import FreeRun
+from workbench.fit.fitting import base_fit, fit
+from workbench.fit.problem import problem
 
 Kind = Literal["full", "poor"]
 FIRST_SEED = 52000
@@ -68,7 +66,7 @@ class Case(NamedTuple):
 
 
 class Task(NamedTuple):
-    """One search of a case; `number` is the seed of its draws and of its disturbance."""
+    """One search of a case; `number` is the seed of its disturbance."""
 
     case: Case
     number: int
@@ -127,11 +125,11 @@ def searched(task: Task) -> Line:
     stirred, start = disturbed(recording, valve, task.number)
     began_s = time.process_time()
     try:
-        base = fit(stirred, start, seed=task.number, workers=1, profile=False)
+        base = fit(stirred, start, workers=1)
     except InputError as error:
         return {**task.case._asdict(), "number": task.number, "refused": error.problem}
     base_s = time.process_time() - began_s
-    found = fit(stirred, start, effects=(task.case.effect,), seed=task.number, workers=1, base=base, profile=False)
+    found = fit(stirred, start, effects=(task.case.effect,), workers=1, base=base)
     return {
         **task.case._asdict(),
         "number": task.number,
@@ -151,9 +149,7 @@ def searched(task: Task) -> Line:
 
 def true_cost(recording: Recording, truth: ValveFile) -> float:
     """Return the cost of the true parameters, over what of the recording is fitted."""
-    composition = Composition.from_file(truth)
-    error = SimulationError(FreeRun(composition, ready(informative(recording))), composition, (), composition.theta)
-    return error.cost(np.zeros(0))
+    return base_fit(problem(ready(informative(recording)), truth.valve), truth, free=()).cost
 
 
 def report(lines: Sequence[Line]) -> Iterator[str]:

@@ -16,10 +16,12 @@ import numpy as np
 from config.valve_file import ValveFile
 from sim.composition import Composition
 from sim.effect import first_effects, shipped_effect
-from workbench import compare, diagnose, fit
+from workbench import compare, diagnose
 from workbench.blind.hiding import hide
 from workbench.data.held_out import split
 from workbench.data.record import Record
+from workbench.fit.fitting import base_fit
+from workbench.fit.problem import problem
 from workbench.model.free_run import FINE, Accuracy, FreeRun
 from workbench.select.tangent_preview import preview
 
@@ -42,14 +44,15 @@ def _waits(seed: int, period_s: float, targets_s: Mapping[str, float]) -> Iterat
     hidden = hide(seed, duration_s=DURATION_S, period_s=period_s)
     library = {name: shipped_effect(name, "library") for name in first_effects()}
     parts = split([hidden.fit], hidden.test)
-    bare = fit(parts.train.recording, hidden.base, profile=False)
-    preview(bare, parts, library)  # compiles what is not in the cache
+    of = problem(parts.train.record, hidden.base.valve)
+    bare = base_fit(of, hidden.base)
+    preview(bare, of, library)  # compiles what is not in the cache
     compare(hidden.fit, hidden.base)
     yield f"{len(hidden.fit)} samples, {DURATION_S:g} s, seed {seed}"
     yield _free_runs(parts.train.record, bare.valve)
     does: Mapping[str, Callable[[], object]] = {
         "compare": lambda: compare(hidden.fit, hidden.base),
-        "preview": lambda: preview(bare, parts, library),
+        "preview": lambda: preview(bare, of, library),
         "diagnose": lambda: diagnose(hidden.fit, hidden.base, test=hidden.test),
     }
     for name, target_s in targets_s.items():

@@ -2,5 +2,6 @@
 
 Its files:
 
-    moves    rests and moves of a stem, each move from its onset to its last sample in motion
+    independence    how many of neighbouring samples are independent
+    moves           rests and moves of a stem, each move from its onset to its last sample in motion
 """

@@ -52,6 +52,8 @@ FAST = 6.0
 """Of v_s: Stribeck's term is gone there, so that static friction makes no difference to a stem that has got there."""
 LOOSE_S = 2e-3
 """Longest step of a stem that may slide, s: within a stem's own times it is fast, and has stopped again."""
+FAR_M = 1e9
+"""Place of a stem that was let go and has left."""
 HELD_N = 1e-9
 """L of a stem that is held and bears nothing: other than 0, which says that it is not."""
 
@@ -104,17 +106,21 @@ def carried(
     seen: float,
     seen_rate: float,
     blur: float,
+    place: float,
     q: Any,
     z: Any,
 ) -> Told:
     """Carry the valve over a duration (s) with the command (Pa) held; L is the largest in it of a stem at rest.
+
+    At rest is, too, what is let go and not farther than `blur` from its `place`, m: so little nobody has seen.
 
     A pressure path that obeys the stem is fed `seen`, m, and its rate, m/s; NaN: the simulated stem.
     """
     t, x, v, p, mode, sigma, indicated = now
     fed = seen == seen  # noqa: PLR0124 -- NaN is unlike itself
     rests = held and mode == STUCK
-    longest = FOREVER_S if rests and not fed else longest_step if rests else min(longest_step, LOOSE_S)
+    slow = not rests and fast == 0.0
+    longest = FOREVER_S if rests and not fed else min(longest_step, LOOSE_S) if slow else longest_step
     free = ordinary(valve)
     n = 1 if duration <= longest else ceil(duration / longest - 1e-6)
     h = duration / n
@@ -126,7 +132,7 @@ def carried(
             there = seen + seen_rate * (t0 - t) if fed else x
             _, s = straight(command, left, Stem(t0, there, v, p), q, z)
             p0, p = pressure(command, command, s, Stem(t0, there, v, p), q, z)
-            if mode == STUCK:
+            if mode == STUCK or abs(x - place) <= blur:
                 most = max(most, load(valve, Stem(t0, x, 0.0, p0), blur, q, z))
             law = free if fast > 0.0 else valve
             x, v, mode, sigma = step(law, Drive(t0, p0, (p - p0) / s), s, x, v, mode, sigma, tolerance, held, q, z)
@@ -168,37 +174,33 @@ def tell(
     a period, and where it was let go in it; 0 where it was not.
     """
     valve, now, fast = told_valve(theta), read(state), 0.0
+    place = FAR_M
     for i in range(len(commands) + 1):
         if i > 0:
-            k, share, before = i - 1, held[i - 1], now.mode
+            k, share = i - 1, held[i - 1]
             loads[0, k], loads[1, k] = 0.0, 0.0
             command, rests_s, slides_s = commands[k], share * periods[k], (1.0 - share) * periods[k]
             rate = (seen[i] - seen[k]) / periods[k]
+            fed = seen[k]
             if rests_s > 0.0:
                 here = carried(
-                    valve, now, command, rests_s, longest_step, tolerance, True, fast, seen[k], rate, blur, theta, state
+                    *(valve, now, command, rests_s, longest_step, tolerance, True, fast, fed, rate, blur, FAR_M),
+                    *(theta, state),
                 )
                 now, loads[0, k], fast = here.now, max(here.load, HELD_N), here.fast
+                place = now.x if now.mode == STUCK else FAR_M
             if slides_s > 0.0:
-                still = now.mode == STUCK and (before == STUCK or rests_s > 0.0)
+                still = abs(now.x - place) <= blur
+                fed += rate * rests_s
                 here = carried(
-                    valve,
-                    now,
-                    command,
-                    slides_s,
-                    longest_step,
-                    tolerance,
-                    False,
-                    fast,
-                    seen[k] + rate * rests_s,
-                    rate,
-                    blur,
-                    theta,
-                    state,
+                    *(valve, now, command, slides_s, longest_step, tolerance, False, fast, fed, rate, blur, place),
+                    *(theta, state),
                 )
                 now, fast = here.now, here.fast
                 if still:
                     loads[1, k] = max(here.load, loads[0, k], HELD_N)
+                if abs(now.x - place) > blur:
+                    place = FAR_M
         path[0, i] = now.t
         path[1, i] = now.p
         path[2, i] = now.x

@@ -59,7 +59,6 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
         metavar="NAME",
         help="with -o: add these effects, whatever the verdict",
     )
-    parser.add_argument("--seed", type=int, default=0, help="of the searches (0)")
     parser.add_argument(
         "--budget-s", type=float, metavar="S", help="end after this many seconds, with what is known by then"
     )
@@ -106,7 +105,6 @@ def run(arguments: argparse.Namespace) -> int:
             valve,
             test=test,
             effects=arguments.effects,
-            seed=arguments.seed,
             on_preview=_tell_preview,
             progress=progress,
             over=(lambda: time.monotonic() - began_s > budget_s),
@@ -194,7 +192,6 @@ def _added(
             arguments.add,
             test=test,
             diagnosis=diagnosis,
-            seed=arguments.seed,
             progress=progress,
             from_pressure=arguments.from_pressure,
         )

@@ -30,7 +30,6 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
     )
     parser.add_argument("--picture", type=Path, metavar="FILE.png", help="draw what the form adds over its variable")
     parser.add_argument("--json", type=Path, metavar="FILE", help="write all numbers as JSON")
-    parser.add_argument("--seed", type=int, default=0, help="of the searches (0)")
     add_pressure_argument(parser)
     add_noise_argument(parser)
     add_export_arguments(parser)
@@ -60,7 +59,6 @@ def run(arguments: argparse.Namespace) -> int:
             recordings,
             valve,
             test=test,
-            seed=arguments.seed,
             from_pressure=arguments.from_pressure,
             on_proposal=_tell_proposal,
             progress=progress,

@@ -43,7 +43,7 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
         metavar=("AUTHORITY.pem", "CERTIFICATE.pem", "KEY"),
         help="connect with Modbus/TCP Security, as an engineer",
     )
-    parser.add_argument("--seed", type=int, default=0, help="of searches and designs (0)")
+    parser.add_argument("--seed", type=int, default=0, help="of the designs (0)")
 
 
 def run(arguments: argparse.Namespace) -> int:
@@ -75,7 +75,6 @@ def run(arguments: argparse.Namespace) -> int:
             valve,
             test=test,
             effects=arguments.effects,
-            seed=arguments.seed,
             progress=progress,
             from_pressure=arguments.from_pressure,
         )

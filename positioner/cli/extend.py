@@ -29,7 +29,6 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
     parser.add_argument("-o", "--out", type=Path, required=True, metavar="NEW.toml")
     parser.add_argument("--json", type=Path, metavar="FILE", help="write all numbers as JSON")
     parser.add_argument("--report", type=Path, metavar="FILE.html", help="write the journal, to be read in a browser")
-    parser.add_argument("--seed", type=int, default=0, help="of the searches (0)")
     add_pressure_argument(parser)
     add_noise_argument(parser)
     add_export_arguments(parser)
@@ -67,7 +66,6 @@ def run(arguments: argparse.Namespace) -> int:
             valve,
             arguments.effect,
             test=test,
-            seed=arguments.seed,
             progress=progress,
             from_pressure=arguments.from_pressure,
         )

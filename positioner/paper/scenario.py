@@ -32,7 +32,8 @@ if TYPE_CHECKING:
 
 PSI = 6894.757
 ALPHA_PA, BETA_PA, OMEGA_RAD_PER_S = 6.4 * PSI, 1.92 * PSI, 1.0
-S1_FROM_S, S2_FROM_S, UNTIL_S = 0.8, 1.8, 2.8
+S1_FROM_S, S2_FROM_S, UNTIL_S = 0.8, 1.8, 4.8
+"""The paper ends at 2.8 s: the way down, which its sine has not seen, goes by steps here, and takes longer."""
 UP_PU, DOWN_PU = 0.6, 0.4
 SEED_PERIOD_S = 1e-5
 DERIVATIVE_WINDOW_S = 500 * SEED_PERIOD_S

@@ -81,9 +81,10 @@ def test_it_ends_soon_and_leaves_picture_recording_and_figures(
     (recording,) = (tmp_path / "out" / "recordings").glob("*.csv")
     (slides,) = (tmp_path / "out" / "slides").glob("*.csv")
     assert read_recording(slides).columns["state"].max() == 3.0
-    identified = any(not each["refusal"] for each in told["identified"] if each["phase"] == "new")
     states = set(read_recording(recording).columns["state"].tolist())
-    assert states == ({0.0, 1.0, 2.0, 3.0} if identified else {0.0, 3.0}), "what is refused moves no stem"
+    assert {0.0, 3.0} <= states
+    if not told["problems"]:
+        assert states == {0.0, 1.0, 2.0, 3.0}
 
 
 @pytest.mark.parametrize("form", [[], ["--hidden"]])

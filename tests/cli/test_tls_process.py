@@ -88,6 +88,7 @@ def test_each_role_may_write_what_is_its_own_and_a_refusal_is_exception_1_and_on
         "experiment_veto": 0,
     }
     operators = {"reference", "reference_scaled", "heartbeat", "acknowledge", "experiment_veto"}
+    operators |= {"alarm_acknowledge", "alarm_shelve", "alarm_shelve_time"}
     allowed = {"observer": set[str](), "operator": operators}
     for register in BY_NAME.values():
         assert (register.writer is Role.ENGINEER) == (register.name not in operators), register

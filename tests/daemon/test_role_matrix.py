@@ -24,7 +24,8 @@ from tests.daemon.test_supervisory_registers import Panel
 
 ROLES = (Role.OBSERVER, Role.OPERATOR, Role.ENGINEER)
 AT_ONCE = 40
-OPERATORS = {"reference", "reference_scaled", "acknowledge", "heartbeat", "experiment_veto"}
+ALARMS = {"alarm_acknowledge", "alarm_shelve", "alarm_shelve_time"}
+OPERATORS = {"reference", "reference_scaled", "acknowledge", "heartbeat", "experiment_veto"} | ALARMS
 """What an operator writes; everything else that may be written is the engineer's."""
 READS = (3, 4)
 WRITES = (6, 16, 23)

@@ -58,7 +58,7 @@ def results(hidden: pos.Hidden, stepped: pos.Recording, bench: pos.Recording) ->
     return {
         "Recording": hidden.fit,
         "Comparison": pos.compare(hidden.fit, hidden.base),
-        "Fit": pos.fit(hidden.fit, hidden.base, profile=False),
+        "Fit": pos.fit(hidden.fit, hidden.base),
         "Diagnosis": pos.diagnose(hidden.fit, hidden.base, test=hidden.test, effects=effects),
         "Discovery": discovered,
         "Extension": pos.extend(hidden.fit, hidden.base, effects, test=hidden.test),

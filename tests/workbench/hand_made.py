@@ -1,7 +1,7 @@
 """Fits and models made by hand: what a search might have come to, for all that follows from its numbers alone.
 
-A model has one block error throughout, so that two differ by what is written here and by nothing else. `scatter`
-makes the blocks differ in turn by a factor of e^scatter up and down, which leaves the mean and widens its error.
+A model has one error throughout, so that two differ by what is written here and by nothing else: its cost says what it
+leaves where it was fitted, its error what it leaves where it was not.
 """
 
 from collections.abc import Mapping
@@ -11,15 +11,15 @@ import numpy as np
 from config.valve_file import EffectTable, ValveFile
 from sim.effect import shipped_effect, shipped_effects
 from tests.workbench.valves import SEED
-from workbench.fit.fit_result import Fit, Search
+from workbench.fit.fit_result import Fit, Term, Terms
 from workbench.fit.fitted_parameter import Fitted
 from workbench.select.block_errors import BlockErrors
 from workbench.select.effect_candidates import EvaluatedModel
 
 LIBRARY = {name: shipped_effect(name, "test") for name in shipped_effects()}
 FLOOR_M = 5e-5
-SAMPLES, FITTED_BLOCKS, HELD_OUT_BLOCKS = 2000, 20, 16
-AT_FLOOR = 0.5 * SAMPLES
+RESIDUALS, FITTED_EVENTS, HELD_OUT_EVENTS = 2000, 20, 16
+AT_FLOOR = 0.5 * RESIDUALS
 """The cost of white residuals."""
 
 
@@ -35,6 +35,12 @@ def valve_with(*effects: str) -> ValveFile:
 
 def fitted(value: float, *, physical: bool = True) -> Fitted:
     return Fitted(value, 0.1, value - 0.2, value + 0.2, not physical, physical)
+
+
+def terms_of(mean_square: float, events: int = FITTED_EVENTS) -> Terms:
+    """Return a likelihood of so many landings, and as many break-aways; every kind leaves as much."""
+    counts = (10.0 * events, events, 5.0 * events, events)
+    return Terms(*(Term(each, mean_square) for each in counts))
 
 
 def fit_of(
@@ -53,42 +59,48 @@ def fit_of(
         rms_m=rms_m,
         floor_m=FLOOR_M,
         cost=cost,
-        count=SAMPLES,
-        starts=(Search(cost, rms_m, {}),),
+        count=RESIDUALS,
+        terms=terms_of(cost / AT_FLOOR),
+        moves=FITTED_EVENTS,
         agreement=more.get("agreement", 3),
         condition=10.0,
         undetermined=(),
         notes=(),
         from_pressure=False,
-        seeds=(),
+        onsets_s=np.zeros(0),
+        load_n=1.0,
     )
 
 
-def errors_of(error_m: float = FLOOR_M, *, scatter: float = 0.0, structure: float = 0.0) -> BlockErrors:
-    in_turn = np.where(np.arange(FITTED_BLOCKS + HELD_OUT_BLOCKS) % 2, 1.0, -1.0)
-    logs = np.log(error_m) + scatter * in_turn
+def errors_of(error_m: float = FLOOR_M, *, structure: float = 0.0) -> BlockErrors:
+    logs = np.full(FITTED_EVENTS + HELD_OUT_EVENTS, 0.5 * np.log1p((error_m / FLOOR_M) ** 2))
     return BlockErrors(
         train_rmse_m=error_m,
         test_rmse_m=error_m,
         train_block_m=error_m,
         test_block_m=error_m,
-        logs=logs[FITTED_BLOCKS:],
+        logs=logs[FITTED_EVENTS:],
         all_logs=logs,
         structure=structure,
-        independent_share=1.0,
+        held_out=terms_of((error_m / FLOOR_M) ** 2, HELD_OUT_EVENTS),
     )
+
+
+def error_with(evidence: float, error_m: float) -> float:
+    """Return the error, m, of a model for which what was held out has this evidence over one with another error, m."""
+    independent = sum(each.independent for each in errors_of().held_out.each)
+    return error_m * float(np.exp(-0.5 * evidence / independent))
 
 
 def model_of(
     *effects: str,
     cost: float = AT_FLOOR,
     error_m: float = FLOOR_M,
-    scatter: float = 0.0,
     structure: float = 0.0,
     agreement: int = 3,
     found: Mapping[str, Fitted] | None = None,
 ) -> EvaluatedModel:
     """Return a model that leaves this cost where it was fitted and this error where it was not."""
-    errors = errors_of(error_m, scatter=scatter, structure=structure)
+    errors = errors_of(error_m, structure=structure)
     fit = fit_of(*effects, cost=cost, rms_m=error_m, found=found, agreement=agreement)
     return EvaluatedModel(fit, errors, FLOOR_M)

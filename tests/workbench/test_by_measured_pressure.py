@@ -44,8 +44,8 @@ def test_by_its_pressure_one_effect_is_named_of_two(bowed: Hidden) -> None:
 @pytest.fixture(scope="module")
 def fits(bowed: Hidden) -> dict[str, Fit]:
     whole = joined([bowed.fit, bowed.test])
-    base = fit(whole, bowed.base, profile=False)
-    return {name: fit(whole, bowed.base, effects=(name,), base=base, profile=False) for name in RIVALS}
+    base = fit(whole, bowed.base)
+    return {name: fit(whole, bowed.base, effects=(name,), base=base) for name in RIVALS}
 
 
 @pytest.mark.long

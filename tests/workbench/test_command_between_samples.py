@@ -142,7 +142,7 @@ def test_a_valve_fitted_again_is_judged_by_the_landings_of_the_search() -> None:
     recording = once_a_second(SEED, 150, offset_s=0.5)
     stirred_pa = recording.command_pa + np.random.default_rng(2).uniform(0.0, 1500.0, 150)
     parts = split([Recording({**recording.columns, "command_pa": stirred_pa}, recording.metadata)])
-    search = EffectSearch(parts, {}, SEED.valve, seed=0, workers=1, progress=lambda _what, _done: None)
+    search = EffectSearch(parts, {}, SEED, workers=1, progress=lambda _what, _done: None)
     one, other = (search.base(ValveFile(valve=each)) for each in (SEED.valve, STUCK))
     assert one.errors.logs.size == other.errors.logs.size
     assert one.fit.count == other.fit.count

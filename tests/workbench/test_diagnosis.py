@@ -78,7 +78,7 @@ def test_the_experiment_separates_what_it_was_chosen_for(diagnosed: Diagnosis, t
 def test_a_valve_is_no_experiment_away_from_itself(diagnosed: Diagnosis, monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setattr("workbench.select.experiment.MENU", dict(list(MENU.items())[:2]))
     twins = [diagnosed.best.fit, replace(diagnosed.best.fit)]
-    assert experiment(twins, diagnosed.split.test.record).separation < 1.1
+    assert experiment(twins, diagnosed.split.test.record).separation < 1.3
 
 
 def test_what_was_found_is_written_as_extend_writes_it(diagnosed: Diagnosis, tmp_path: Path) -> None:
@@ -110,7 +110,7 @@ def force(v: float, q: Parameters) -> float:
 def test_a_parameter_that_would_have_to_be_negative_is_not_physical(tmp_path: Path) -> None:
     (tmp_path / "push.py").write_text(PUSH)
     pushed = with_effect(BARE, str(tmp_path / "push.py"), push_ns2_per_m2=300.0)
-    found = fit(record_of(pushed, 6, COUNT // 2), SEED, effects=("quadratic_drag",), profile=False)
+    found = fit(record_of(pushed, 6, COUNT // 2), SEED, effects=("quadratic_drag",))
     drag = found.parameters["quadratic_drag.drag_ns2_per_m2"]
     assert (drag.at_bound, drag.physical) == (True, False)
     assert drag.value == pytest.approx(0.0, abs=1.0)

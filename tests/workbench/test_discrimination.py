@@ -6,7 +6,7 @@ from dataclasses import replace
 from math import log
 from pathlib import Path
 from types import SimpleNamespace
-from typing import Literal, cast
+from typing import Literal
 
 import numpy as np
 import pytest
@@ -17,12 +17,12 @@ from positioner.cli.main import main
 from sim.composition import Composition
 from sim.effect import shipped_effect, shipped_effects
 from sim.open_loop import respond
+from tests.workbench.hand_made import AT_FLOOR, fit_of
 from tests.workbench.valves import drawn_valve, record_of, with_effect
 from workbench.discriminate import rival_race
-from workbench.discriminate.discrimination import Discrimination, Played, Player, Round, Waiting, discriminate
+from workbench.discriminate.discrimination import SURE, Discrimination, Played, Player, Round, discriminate
 from workbench.discriminate.experiment_design import (
     MOST_MOVES,
-    WAYS,
     Bounds,
     Course,
     DesignedExperiment,
@@ -30,7 +30,7 @@ from workbench.discriminate.experiment_design import (
     Terms,
     told_apart,
 )
-from workbench.discriminate.rival_race import ASKED, ODDS, RivalRace, Weighed, _independent_share, agreed, log_odds
+from workbench.discriminate.rival_race import ASKED, RivalRace, Weighed, evidence
 from workbench.fit.fit_result import Fit
 from workbench.fit.fitting import fit
 from workbench.select.experiment import REST_S
@@ -51,69 +51,48 @@ def recording() -> Recording:
 
 @pytest.fixture(scope="module")
 def fits(recording: Recording) -> dict[str, Fit]:
-    base = fit(recording, BARE, profile=False)
-    return {name: fit(recording, BARE, effects=(name,), base=base, profile=False) for name in RIVALS}
+    base = fit(recording, BARE)
+    return {name: fit(recording, BARE, effects=(name,), base=base) for name in RIVALS}
 
 
-def weighed(one: Fit, cost: float, logs: Sequence[float], share: float = 1.0, count: int = 1000) -> Weighed:
-    return Weighed(replace(one, cost=cost, count=count), np.array(logs), share)
+def weighed(left: float, logs: Sequence[float], *effects: str) -> Weighed:
+    """Return a rival that leaves so many times the noise's mean square, and these errors event by event."""
+    return Weighed(fit_of(*effects, cost=left * AT_FLOOR), np.array(logs))
+
+
+NOTHING = [0.0] * 20
 
 
 def apart(size: float) -> list[float]:
-    """Return errors, slip by slip, that differ from none by so much, with some scatter."""
+    """Return errors, event by event, that differ from none by so much, with some scatter."""
     return [size * (1.0 + 0.1 * (-1.0) ** i) for i in range(20)]
 
 
-def test_log_odds_by_hand(fits: dict[str, Fit]) -> None:
-    one = fits["ip_lag"]
-    best = weighed(one, 500.0, [0.0] * 20)
-    assert log_odds(best, weighed(one, 550.0, apart(0.15))) == pytest.approx(500.0 * log(1.1))
+def test_log_odds_by_hand() -> None:
+    independent = sum(each.independent for each in fit_of().terms.each)
+    best, rival = weighed(1.0, NOTHING), weighed(1.1, apart(0.15))
+    assert evidence(best, rival) == pytest.approx(0.5 * independent * log(1.1))
+    assert evidence(rival, best) == pytest.approx(-evidence(best, rival))
 
 
-def test_what_hangs_together_counts_once(fits: dict[str, Fit]) -> None:
-    one = fits["ip_lag"]
-    best = weighed(one, 500.0, [0.0] * 20, share=0.01)
-    assert log_odds(best, weighed(one, 550.0, apart(0.15))) == pytest.approx(5.0 * log(1.1))
+def test_a_parameter_more_costs_the_rival_evidence() -> None:
+    best = weighed(1.0, NOTHING)
+    more = evidence(best, weighed(1.1, apart(0.15), "ip_lag")) - evidence(best, weighed(1.1, apart(0.15)))
+    assert more == pytest.approx(0.5 * log(fit_of().terms.events))
 
 
-def test_a_parameter_more_costs_the_rival_evidence(fits: dict[str, Fit]) -> None:
-    one = fits["ip_lag"]
-    more = replace(one, parameters={**one.parameters, "another": next(iter(one.parameters.values()))})
-    best, rival = weighed(one, 500.0, [0.0] * 20), weighed(more, 550.0, apart(0.15))
-    assert log_odds(best, rival) == pytest.approx(500.0 * log(1.1) + 0.5 * log(1000.0))
+def test_one_event_that_went_wrong_gives_little_odds() -> None:
+    assert evidence(weighed(1.0, NOTHING), weighed(1.8, [3.0] + [0.0] * 19)) < log(6.0)
 
 
-def test_one_slip_that_went_wrong_gives_little_odds(fits: dict[str, Fit]) -> None:
-    one = fits["ip_lag"]
-    best = weighed(one, 500.0, [0.0] * 20)
-    assert log_odds(best, weighed(one, 900.0, [3.0] + [0.0] * 19)) < log(6.0)
-
-
-def test_slips_that_hardly_agree_say_hardly_more_than_chance(fits: dict[str, Fit]) -> None:
-    one = fits["ip_lag"]
-    best = weighed(one, 500.0, [0.0] * 25)
+def test_events_that_hardly_agree_say_hardly_more_than_chance() -> None:
     one_deviation_in_five = [0.1 + 0.5 * (-1.0) ** i for i in range(24)] + [0.1]
-    assert log_odds(best, weighed(one, 550.0, one_deviation_in_five)) == pytest.approx(1.67, rel=0.1)
+    best = weighed(1.0, [0.0] * 25)
+    assert evidence(best, weighed(1.1, one_deviation_in_five)) == pytest.approx(1.67, rel=0.1)
 
 
-def test_what_a_slip_has_spoilt_counts_once_however_long_it_lasts() -> None:
-    parts = [np.full(100, 1.0) for _ in range(9)] + [np.full(2000, 100.0)]
-    assert _independent_share(parts) * 2900 < 5.0
-    assert _independent_share([np.array([1.0, 100.0])] * 1450) == 1.0
-
-
-def test_a_few_slips_that_luck_mistimed_name_nothing(fits: dict[str, Fit]) -> None:
-    """By the pressure all else is at the noise, and they are the cost: an asymmetry was called a preload by four."""
-    best, rival = weighed(fits["ip_lag"], 500.0, [0.0] * 40), weighed(fits["ip_lag"], 600.0, apart(0.15) * 2)
-    slip, costs = np.arange(40), np.full(40, 5.0)
-    by_two, by_all = (replace(rival, costs=costs + each) for each in (60.0 * (slip < 2), 2.0 + slip % 3))
-    best = replace(best, costs=costs)
-    assert log_odds(best, by_two) < log(15.0) < log_odds(best, by_all)
-
-
-def test_a_better_rival_is_not_spoken_against(fits: dict[str, Fit]) -> None:
-    one = fits["ip_lag"]
-    assert log_odds(weighed(one, 500.0, [0.0] * 20), weighed(one, 400.0, apart(-0.15))) == 0.0
+def test_where_events_speak_against_what_all_residuals_say_nothing_is_said() -> None:
+    assert evidence(weighed(1.0, NOTHING), weighed(1.1, apart(-0.15))) == 0.0
 
 
 def test_the_moves_of_a_course_are_the_times_its_command_sets_out() -> None:
@@ -140,10 +119,10 @@ def test_a_pair_that_no_course_tells_apart_is_left_out_unless_there_is_no_other(
 def test_an_experiment_is_designed_for_the_likeliest(
     fits: dict[str, Fit], recording: Recording, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    race = RivalRace({f"{name} {i}": each for name, each in fits.items() for i in range(3)}, (recording,), 0, 1)
+    race = RivalRace({f"ip_lag {i}": fits["ip_lag"] for i in range(ASKED + 1)}, (recording,), 1)
     asked: list[object] = []
     monkeypatch.setattr(rival_race, "designed", lambda left, *_, **__: asked.extend(left))
-    race.run_experiment(Terms(BOUNDS))
+    race.experiment(Terms(BOUNDS))
     assert len(race.alive) > ASKED
     assert asked == race.alive[:ASKED]
 
@@ -163,13 +142,14 @@ def answering(chosen: DesignedExperiment) -> Played:
 
 
 class Design:
-    """A designer that says the same whatever it is allowed, or by what it is allowed; it notes that."""
+    """A designer that says one thing of few moves, and the same or another of many; it notes on what terms."""
 
     def __init__(
-        self, separation: float, course: Course = COURSE, otherwise: Course | None = None, by_slips: float = 0.0
+        self, separation: float, course: Course = COURSE, of_many: float | None = None, many: Course | None = None
     ) -> None:
-        self.separation, self.by_slips = separation, by_slips
-        self.course, self.otherwise = course, otherwise or course
+        self.course = course
+        self._few = DesignedExperiment(course, separation)
+        self._many = DesignedExperiment(many or course, of_many or separation)
         self.terms: list[Terms] = []
 
     @property
@@ -178,8 +158,7 @@ class Design:
 
     def __call__(self, race: RivalRace, terms: Terms) -> DesignedExperiment | None:
         self.terms.append(terms)
-        course = self.course if terms.most_moves < MOST_MOVES else self.otherwise
-        return DesignedExperiment(course, self.separation, by_slips=self.by_slips)
+        return self._few if terms.most_moves < MOST_MOVES else self._many
 
 
 def silent(_: DesignedExperiment) -> Played:
@@ -214,61 +193,8 @@ def test_a_run_that_told_nothing_waits(fits: dict[str, Fit], recording: Recordin
     design = Design(2.0)
     found = discriminate(twin, [recording], answering, BOUNDS, LIBRARY, design=design, budget=4)
     assert (found.outcome, found.moves) == ("budget_spent", 4)
-    first, then = design.terms[0], design.terms[-1]
-    assert (first.without, first.ways) == (frozenset(), WAYS)
-    assert (then.without, then.ways) == (frozenset({COURSE.name}), frozenset({"slips"}))
-
-
-@pytest.mark.long
-def test_what_a_whole_budget_would_tell_is_played_to_its_end(fits: dict[str, Fit], recording: Recording) -> None:
-    """That the last moves alone promise nothing does not say that the valve cannot tell."""
-    twin = {"ip_lag": fits["ip_lag"], "rate_limit": fits["ip_lag"]}
-    found = discriminate(twin, [recording], answering, BOUNDS, LIBRARY, design=Design(1.0, by_slips=0.3), budget=4)
-    assert (found.outcome, found.moves) == ("budget_spent", 4)
-
-
-@pytest.mark.long
-def test_slips_wait_when_they_have_told_nothing_twice(fits: dict[str, Fit], recording: Recording) -> None:
-    """They promise a mean, about which luck scatters."""
-    twin = {"ip_lag": fits["ip_lag"], "rate_limit": fits["ip_lag"]}
-    design = Design(1.0, by_slips=2.0)
-    discriminate(twin, [recording], answering, BOUNDS, LIBRARY, design=design, budget=6)
-    assert [each.ways for each in design.terms] == [WAYS] * 4 + [{"run"}], "a third time they wait"
-
-
-@pytest.mark.parametrize(("z", "promised"), [(0.0, 6.0), (1.0, 6.0), (2.0, 0.0)])
-def test_log_odds_that_say_no_more_than_slips_agree_rise_by_less_than_is_promised(z: float, promised: float) -> None:
-    race = cast(RivalRace, SimpleNamespace(behind={"a": 0.0, "b": agreed(z)}, promised=lambda _: promised))
-    expected = agreed((z**2 + 0.5 * promised) ** 0.5) - agreed(z)
-    assert RivalRace.expected(race, DesignedExperiment(COURSE, 2.0)) == pytest.approx(expected, abs=1e-9)
-
-
-def test_what_came_to_less_than_a_quarter_of_what_was_expected_waits() -> None:
-    run, by_slips = DesignedExperiment(COURSE, 2.0), DesignedExperiment(COURSE, 1.0, by_slips=4.0)
-    kept = Waiting()
-    kept.heard(run, expected=4.0, told=1.1)
-    kept.heard(by_slips, expected=4.0, told=0.0)
-    kept.heard(by_slips, expected=4.0, told=2.1)
-    assert not kept
-    kept.heard(by_slips, expected=4.0, told=0.1)
-    assert not kept, "the latest two told enough"
-    kept.heard(run, expected=4.0, told=0.9)
-    assert (kept.runs, kept.ways) == ({COURSE.name}, {"run"})
-
-
-def test_nobody_is_asked_for_more_than_the_odds() -> None:
-    kept = Waiting()
-    kept.heard(DesignedExperiment(COURSE, 2.0), expected=1e3, told=0.3 * log(ODDS))
-    assert not kept
-
-
-def test_where_both_ways_have_told_nothing_both_are_asked_again() -> None:
-    kept = Waiting()
-    kept.heard(DesignedExperiment(COURSE, 2.0), expected=4.0, told=0.0)
-    for _ in range(2):
-        assert kept.ways == {"run"}
-        kept.heard(DesignedExperiment(COURSE, 1.0, by_slips=4.0), expected=4.0, told=0.0)
-    assert (kept.runs, kept.ways) == ({COURSE.name}, set()), "but no run that has told nothing"
+    assert design.terms[0].without == frozenset()
+    assert design.terms[-1].without == frozenset({COURSE.name})
 
 
 @pytest.mark.long
@@ -297,21 +223,23 @@ def test_who_is_ruled_out_is_said(outcome: Literal["not_separable", "budget_spen
     assert found.as_json()["lost"] == ["preload"]
 
 
-def test_more_moves_are_weighed_against_few(fits: dict[str, Fit], recording: Recording) -> None:
-    """Twice as long for as many moves promises twice as much; as long for three times the moves, less."""
-    played: list[str] = []
+@pytest.mark.parametrize(
+    ("few", "many", "asked", "played"),
+    [(SURE, 9.0, [3], "few moves"), (1.5, 1.4, [3, 8], "few moves"), (1.4, 1.5, [3, 8], "many moves")],
+)
+def test_few_moves_are_played_where_they_will_do(
+    fits: dict[str, Fit], recording: Recording, few: float, many: float, asked: list[int], played: str
+) -> None:
+    told: list[str] = []
 
     def noted(chosen: DesignedExperiment) -> Played:
-        played.append(chosen.course.name)
+        told.append(chosen.course.name)
         return silent(chosen)
 
-    longer = Course("longer", COURSE.first_pa, tuple(replace(leg, hold_s=5.0) for leg in COURSE.legs))
-    busier = Course("busier", COURSE.first_pa, tuple(replace(leg, hold_s=0.3) for leg in 3 * COURSE.legs))
-    for more in (longer, busier):
-        design = Design(1.002, otherwise=more)
-        discriminate(fits, [recording], noted, BOUNDS, LIBRARY, design=design, budget=30)
-        assert design.asked == [3, 8]
-    assert played == ["longer", "by hand"]
+    courses = replace(COURSE, name="few moves"), replace(COURSE, name="many moves", legs=3 * COURSE.legs)
+    design = Design(few, courses[0], many, courses[1])
+    discriminate(fits, [recording], noted, BOUNDS, LIBRARY, design=design, budget=30)
+    assert (design.asked, told) == (asked, [played])
 
 
 def test_what_the_valve_does_not_play_stops_it(fits: dict[str, Fit], recording: Recording) -> None:
@@ -415,7 +343,6 @@ def test_the_best_is_not_named_if_it_does_not_explain_the_experiments(
     fits: dict[str, Fit], recording: Recording, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     monkeypatch.setattr("workbench.discriminate.rival_race.RARELY_OFF", 0.5)
-    monkeypatch.setattr(RivalRace, "searched_anew", lambda race: race)
     found = discriminate(fits, [recording], answering, BOUNDS, LIBRARY, design=Design(2.0))
     assert (found.outcome, found.named) == ("unexplained", ())
     assert found.odds >= 100.0

@@ -67,7 +67,7 @@ def test_what_is_said_is_in_the_drives_units(wrong: Comparison) -> None:
 
 
 def test_a_fit_names_the_drives_parameters(axis: ValveFile, recording: Recording) -> None:
-    found = fit(recording, axis, free=("viscous_ns_per_m", "coulomb_n"), workers=1, profile=False)
+    found = fit(recording, axis, free=("viscous_ns_per_m", "coulomb_n"), workers=1)
     assert found.valve.valve.kind == "rotary motor"
     assert found.valve.valve.coulomb_n == pytest.approx(0.03, rel=0.02)
     said = found.summary()

@@ -1,7 +1,8 @@
-"""What a candidate is held against: block errors, the meter of structure, algebraic classes, what is held out."""
+"""What a candidate is held against: two evidences, errors of events, structure, classes, what is held out."""
 
 import tracemalloc
 from dataclasses import replace
+from math import log
 
 import numpy as np
 import pytest
@@ -10,20 +11,17 @@ from config.drive import VALVE
 from config.errors import InputError
 from config.recording import Recording
 from sim.effect import shipped_effect, shipped_effects
-from tests.workbench.hand_made import FLOOR_M, model_of
+from tests.workbench.hand_made import FITTED_EVENTS, FLOOR_M, errors_of, fit_of, model_of
+from tests.workbench.valves import SEED, record_of
 from workbench.data.held_out import joined, residual_m, split
 from workbench.data.record import ready
 from workbench.diagnosis.verdict_sentence import reduction_sentence
-from workbench.select.block_errors import (
-    BlockErrors,
-    Told,
-    block_logs,
-    independent_share,
-    indistinguishable,
-    relative_error_reduction,
-)
-from workbench.select.effect_acceptance import Gain
-from workbench.select.effect_acceptance import gain as gain_of
+from workbench.fit.fit_result import Term
+from workbench.fit.fitting import base_fit
+from workbench.fit.problem import problem
+from workbench.model.told_run import told_moves
+from workbench.select.block_errors import block_errors, block_logs, indistinguishable, relative_error_reduction
+from workbench.select.effect_acceptance import LEAST_BIC, LEAST_HELD_OUT, Gain, evidence_for, gain
 from workbench.select.equivalence import algebraic_class, bare_parameter, classes
 from workbench.select.residual_structure import STRUCTURED, structure
 
@@ -60,8 +58,8 @@ def test_a_narrowly_mistimed_slip_does_not_hide_a_gain_in_all_other_blocks() -> 
     before = np.log(np.full(30, 1e-4))
     after = np.log(np.full(30, 5e-5))
     after[12:15] = np.log(6e-3)
-    gain, standard_errors = relative_error_reduction(before, after)
-    assert gain > 0.05
+    reduction, standard_errors = relative_error_reduction(before, after)
+    assert reduction > 0.05
     assert standard_errors > 2.0
 
 
@@ -73,7 +71,7 @@ def test_a_slip_met_by_luck_is_no_gain() -> None:
 
 
 @pytest.mark.parametrize(
-    ("train_rmse", "told_rmse", "train_block", "test_block", "there"),
+    ("train_rmse", "test_rmse", "train_event", "test_event", "there"),
     [
         (1.0, 1.0, 1.0, 1.0, True),
         (2.0, 1.0, 1.0, 1.0, False),
@@ -82,18 +80,18 @@ def test_a_slip_met_by_luck_is_no_gain() -> None:
         (1.0, 1.0, 1.0, 1.7, False),
     ],
 )
-def test_the_floor_is_missed_by_many_blocks_or_by_far_in_a_few(
-    train_rmse: float, told_rmse: float, train_block: float, test_block: float, there: bool
+def test_the_floor_is_missed_by_many_events_or_by_far_in_a_few(
+    train_rmse: float, test_rmse: float, train_event: float, test_event: float, there: bool
 ) -> None:
-    none = np.zeros(0)
-    rmse = (train_rmse, 20.0, train_block, test_block)
-    errors = BlockErrors(*rmse, none, none, 0.0, 1.0, told=Told(told_rmse, test_block))
+    errors = replace(
+        errors_of(),
+        train_rmse_m=train_rmse,
+        test_rmse_m=test_rmse,
+        train_block_m=train_event,
+        test_block_m=test_event,
+    )
     assert errors.at_floor(1.0) is there
     assert not errors.at_floor(None), "where the floor is unknown nobody can say"
-
-
-def errors_of(logs: np.ndarray) -> BlockErrors:
-    return BlockErrors(1e-4, 1e-4, 1e-4, 1e-4, logs[30:], logs, 0.0, 1.0)
 
 
 def test_two_are_indistinguishable_that_differ_by_a_narrowly_mistimed_slip_and_not_if_one_is_worse_throughout() -> None:
@@ -105,74 +103,60 @@ def test_two_are_indistinguishable_that_differ_by_a_narrowly_mistimed_slip_and_n
 
 
 def test_a_fall_is_never_said_of_an_error_that_rises() -> None:
-    before = replace(errors_of(np.zeros(60)), test_rmse_m=1.31e-4, test_block_m=9e-5)
-    assert (
-        reduction_sentence(before, errors_of(np.zeros(60)), VALVE.length)
-        == "the held-out error falls from 0.131 to 0.1 mm"
-    )
-    missed = replace(before, test_rmse_m=4.39e-4, test_block_m=5e-5)
+    before, after = errors_of(1.31e-4), errors_of(1e-4)
+    assert reduction_sentence(before, after, VALVE.length) == "the held-out error falls from 0.131 to 0.1 mm"
+    before = replace(errors_of(9e-5), test_rmse_m=1.31e-4)
+    missed = replace(errors_of(5e-5), test_rmse_m=4.39e-4)
     assert reduction_sentence(before, missed, VALVE.length) == (
-        "the held-out error of a typical second falls from 0.09 to 0.05 mm, "
-        "though a narrowly mistimed slip moves the rms from 0.131 to 0.439 mm"
+        "the held-out error of a typical move falls from 0.09 to 0.05 mm, though the rms rises from 0.131 to 0.439 mm"
     )
 
 
-def test_what_hangs_together_is_few_independent_samples() -> None:
-    white = noise(20000)
-    assert independent_share(white) == pytest.approx(1.0, abs=0.03)
-    wandering = np.zeros(20000)
-    for i in range(1, wandering.size):
-        wandering[i] = 0.9 * wandering[i - 1] + white[i]
-    assert independent_share(wandering) == pytest.approx(0.1 / 1.9, rel=0.15)
-    wandering[::7] = np.nan
-    assert independent_share(wandering) == pytest.approx(0.1 / 1.9, rel=0.2)
-    assert independent_share(np.zeros(100)) == 1.0
+@pytest.mark.parametrize("bic", [-50.0, LEAST_BIC, LEAST_BIC + 0.1, 1e4])
+@pytest.mark.parametrize("held_out", [-50.0, LEAST_HELD_OUT, LEAST_HELD_OUT + 0.1, 1e4])
+def test_what_was_fitted_and_what_was_held_out_must_both_say_that_it_is_there(bic: float, held_out: float) -> None:
+    reason = Gain(bic, 0.3, held_out).rejection_reason
+    assert (reason == "") == (bic > LEAST_BIC and held_out > LEAST_HELD_OUT)
+    if bic <= LEAST_BIC:
+        assert reason.startswith(f"may be chance: evidence {bic:.3g}, more than 10 needed")
+    elif held_out <= LEAST_HELD_OUT:
+        assert f"evidence {held_out:.3g} there, more than 6 needed" in reason
 
 
-@pytest.mark.parametrize(
-    ("gain", "said"),
-    [
-        (Gain(9.0, 0.5, 9.0, 1.0), "evidence 9"),
-        (Gain(90.0, 0.04, 9.0, 1.0), "falls by 4 %"),
-        (Gain(90.0, -0.11, -9.0, 1.0), "rises by 11 %, a fall of more than 5 % needed"),
-        (Gain(90.0, 0.5, 1.9, 1.0), "1.9 times its own uncertainty"),
-    ],
-)
-def test_each_part_of_the_rule_can_refuse_and_says_so(gain: Gain, said: str) -> None:
-    assert said in gain.rejection_reason(at_floor=False)
+def test_evidence_is_what_each_kind_of_residual_says_by_as_many_as_are_independent() -> None:
+    """Twice the log-likelihood, each kind at the scale that it leaves, less log n a parameter more."""
+    base = fit_of()
+    told = replace(base, terms=replace(base.terms, landings=Term(FITTED_EVENTS, 0.5)))
+    assert evidence_for(told, base) == pytest.approx(FITTED_EVENTS * log(2.0))
+    assert evidence_for(told, base) == -evidence_for(base, told)
+    more = fit_of("ip_lag")
+    assert evidence_for(more, base) == pytest.approx(-log(2.0 * FITTED_EVENTS)), "it is paid for, whatever it leaves"
 
 
-def test_what_passes_every_part_is_not_refused() -> None:
-    assert not Gain(11.0, 0.06, 2.1, 0.3).rejection_reason(at_floor=False)
-    assert "evidence 11 counts for 1.1, more than 3" in Gain(11.0, 0.06, 2.1, 0.1).rejection_reason(at_floor=False)
-    assert not Gain(1e3, 0.4, 3.1, 1e-5).rejection_reason(at_floor=False), "one arc, held out too"
-    assert "evidence 90 counts for 9, more than 10" in Gain(90.0, 0.5, 9.0, 0.1).rejection_reason(at_floor=True)
-    assert "more than 3 needed" in Gain(11.0, 0.06, 2.9, 1.0).rejection_reason(at_floor=True)
-    assert not Gain(11.0, 0.06, 3.1, 1.0).rejection_reason(at_floor=True)
+def test_what_hangs_together_counts_for_as_many_as_are_independent() -> None:
+    base = fit_of()
+    few = replace(base.terms, motion=Term(3.0, 0.01))
+    assert few.nats_above(base.terms) == pytest.approx(1.5 * log(100.0))
+    assert base.terms.nats_above(few) == pytest.approx(-1.5 * log(100.0)), "of two the fewer"
 
 
-def test_what_acts_rarely_and_leaves_nothing_need_not_show_in_many_blocks() -> None:
-    rare = Gain(1000.0, 0.06, 1.5, 0.9, completes=True)
-    assert not rare.rejection_reason(at_floor=True)
-    assert "more than 3 needed" in replace(rare, completes=False).rejection_reason(at_floor=True)
-    assert "more than 3 needed" in replace(rare, bic=100.0).rejection_reason(at_floor=True), "90 independent: chance"
-    assert "more than 1 needed" in replace(rare, standard_errors=0.9).rejection_reason(at_floor=True)
-    assert "a fall of more than 5 %" in replace(rare, held_out=0.04).rejection_reason(at_floor=True)
-    seen = replace(rare, held_out=0.03, standard_errors=3.1)
-    assert not seen.rejection_reason(at_floor=True), "in one block of twenty, which the mean of all cannot show better"
-    assert "a fall of more than 5 %" in replace(seen, completes=False).rejection_reason(at_floor=True)
-    assert "a fall of more than 5 %" in replace(seen, bic=100.0).rejection_reason(at_floor=True)
+def test_of_what_was_held_out_no_parameter_is_paid_for() -> None:
+    base, better = model_of(), model_of("ip_lag", error_m=0.5 * FLOOR_M)
+    found = gain(base.fit, better.fit, base.errors, better.errors)
+    independent = sum(each.independent for each in base.errors.held_out.each)
+    assert found.held_out_evidence == pytest.approx(independent * log(4.0))
+    assert found.held_out == pytest.approx(0.5)
 
 
-@pytest.mark.parametrize(
-    ("floors_before", "floors_after", "floor_m", "completes"),
-    [(1.3, 1.0, FLOOR_M, True), (1.1, 1.0, FLOOR_M, False), (1.3, 1.2, FLOOR_M, False), (1.3, 1.0, None, False)],
-)
-def test_it_completes_what_leaves_more_than_the_noise_may_be_off_by(
-    floors_before: float, floors_after: float, floor_m: float | None, completes: bool
-) -> None:
-    before, after = (model_of(error_m=floors * FLOOR_M) for floors in (floors_before, floors_after))
-    assert gain_of(before.fit, after.fit, before.errors, after.errors, floor_m).completes == completes
+def test_what_was_fitted_is_no_evidence_of_what_was_held_out() -> None:
+    """Where the end of a recording is held out, its moves alone are."""
+    recording = record_of(SEED, 2)
+    parts = split([recording])
+    errors = block_errors(base_fit(problem(parts.train.record, SEED.valve), SEED), parts)
+    told = [each for each in told_moves(parts.test.record) if parts.test.counted[each.after : each.until + 1].any()]
+    assert 0 < len(told) < len(told_moves(parts.test.record))
+    assert errors.held_out.break_aways.independent <= len(told)
+    assert errors.held_out.landings.independent <= len(told)
 
 
 def test_noise_has_no_structure() -> None:
@@ -259,6 +243,6 @@ def test_too_little_to_hold_some_out_is_said() -> None:
 
 def test_what_the_arithmetic_leaves_has_no_structure() -> None:
     record = ready(moving())
-    left_m = 1e-4 * NOISE_M * np.sin(1.3 * record.time_s)
+    left_m = 1e-4 * (noise(3000) + NOISE_M * np.sign(np.gradient(record.command_pa)))
     assert structure(record, left_m) > STRUCTURED
     assert structure(record, left_m, 0.1 * NOISE_M) < STRUCTURED

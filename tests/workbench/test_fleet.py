@@ -153,7 +153,7 @@ def test_what_changed_is_drawn_and_a_date_that_cannot_be_compared_refused(
         ("tight", "coulomb_n"),
     }
     (axes,) = changes.plot().axes
-    assert [each.get_text() for each in axes.get_yticklabels()][-1] == "play  backlash.width_m"
+    assert "play  backlash.width_m" in [each.get_text() for each in axes.get_yticklabels()]
     capsys.readouterr()
     assert main([*words, "--since", "2026-01-15T00:00+00:00"]) == 2
     assert "must have no offset" in capsys.readouterr().err

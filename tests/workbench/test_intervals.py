@@ -1,4 +1,4 @@
-"""Intervals hold where the valve scatters from slip to slip, and where only the sensor is noisy: rates over draws."""
+"""Intervals hold where the valve scatters from move to move, and where only the sensor is noisy: rates over draws."""
 
 import numpy as np
 import pytest
@@ -8,62 +8,63 @@ from config.recording import Column
 from sim.composition import Composition
 from sim.karnopp import Vector
 from tests.cases import few_always
-from tests.workbench.valves import SLIM, creeping, record_of
-from workbench.data.motion import Directions, slips
-from workbench.data.record import Record, ready
-from workbench.fit.objective import SimulationError, soft
-from workbench.fit.uncertainty import uncertainty
-from workbench.model.free_run import FreeRun
-from workbench.model.parameters import free_parameters
+from tests.workbench.valves import SLIM, record_of
+from workbench.data.record import ready
+from workbench.fit.likelihood import Groups, Likelihood, soft
+from workbench.fit.minimiser import End
+from workbench.fit.problem import problem
+from workbench.fit.uncertainty import _clusters, uncertainty
 
 DRAWS = 100
 TELL = 6
-"""Every so many slips one that tells of the parameter."""
+"""Every so many moves one that tells of the parameter."""
 
 
-class Straight(SimulationError):
-    """An error that is a straight line in its one coordinate, true at 0."""
+class Straight:
+    """A likelihood that is a straight line in its one coordinate, true at 0."""
 
-    def __init__(self, record: Record, slope: Column, wrong: Column) -> None:
-        composition = Composition.from_file(SLIM)
-        super().__init__(
-            FreeRun(composition, record), composition, free_parameters(composition, ["coulomb_n"]), composition.theta
-        )
-        self.lower, self.upper = np.array([-5.0]), np.array([5.0])
-        self._slope, self._wrong = slope, wrong
+    def __init__(self, like: Likelihood, slope: Vector) -> None:
+        self._like, self._slope = like, slope
+        groups = like.at(like.composition.theta, like.run.first_onsets_s())
+        self._splits = np.cumsum([each.size for each in groups])[:-1]
 
-    def compared(self, z: Vector, scale: float, limit: float) -> tuple[Vector, float]:
-        apart = np.asarray(self._wrong + self._slope * z[0])
-        return apart, soft(apart, scale)
+    def held(self, wrong: Vector) -> bool:
+        """Whether the interval about the least holds the truth, of residuals that are wrong by so much there."""
 
-    def by_slips(self, *_: object) -> "Straight":
-        return self
+        def rows(z: float) -> Vector:
+            return np.asarray(wrong + self._slope * z)
 
-    def held(self) -> bool:
-        """Whether the interval about the least holds the truth."""
-        least = minimize_scalar(lambda z: self.cost(np.array([z])), bounds=(-2.0, 2.0), method="bounded").x
-        found = uncertainty(self, np.array([float(least)]))
+        least = minimize_scalar(lambda z: float(soft(rows(z)).sum()), bounds=(-2.0, 2.0), method="bounded").x
+        r = rows(float(least))
+        groups = Groups(*np.split(r, self._splits))
+        end = End(np.array([float(least)]), np.empty(0), float(soft(r).sum()), groups, self._slope[:, None])
+        found = uncertainty(self._like, end)
         return bool(found.lower[0] <= 0.0 <= found.upper[0])
 
 
-@pytest.fixture(scope="module")
-def record() -> Record:
-    return ready(record_of(SLIM, 7, command_pa=creeping()))
+def to_and_fro() -> Column:
+    """Return a command of many moves, Pa: steps up and down, each held for half a second."""
+    base, generator = SLIM.valve, np.random.default_rng(0)
+    share = 0.5 + np.where(np.arange(80) % 2, 0.3, -0.3) * generator.uniform(0.5, 1.0, 80)
+    return np.repeat(share * base.spring_n_per_m * base.stroke_m / base.diaphragm_area_m2, 50)
 
 
 @pytest.fixture(scope="module")
-def slip(record: Record) -> Directions:
-    """The slip that each sample belongs to."""
-    firsts = [each.first for each in slips(record.position_m, record.scale_m)]
-    return np.searchsorted(firsts, np.arange(len(record)), side="right")
+def like() -> Likelihood:
+    record = ready(record_of(SLIM, 7, command_pa=to_and_fro()))
+    return problem(record, SLIM.valve).likelihood(Composition.from_file(SLIM), ["coulomb_n"])
 
 
 @pytest.mark.parametrize("scatter", few_always([3.0, 0.0]))
-def test_the_truth_lies_inside_in_nineteen_of_twenty(record: Record, slip: Directions, scatter: float) -> None:
+def test_the_truth_lies_inside_in_nineteen_of_twenty(like: Likelihood, scatter: float) -> None:
     generator = np.random.default_rng(1)
-    slope = np.where(slip % TELL == 0, 10.0, 0.1)
+    move_of = np.full(like.count, -1)
+    for k, rows in enumerate(_clusters(like)):
+        move_of[rows] = k
+    moves = move_of.max() + 1
+    straight = Straight(like, np.where(move_of % TELL == 0, 10.0, 0.1))
     held = 0
     for _ in range(DRAWS):
-        own = scatter * generator.standard_normal(slip.max() + 1) * np.where(np.arange(slip.max() + 1) % TELL, 1.0, 4.0)
-        held += Straight(record, slope, own[slip] + generator.standard_normal(slip.size)).held()
+        own = scatter * generator.standard_normal(moves + 1) * np.where(np.arange(moves + 1) % TELL, 1.0, 4.0)
+        held += straight.held(own[move_of] + generator.standard_normal(like.count))
     assert held >= 0.85 * DRAWS, "by samples alone 63 of 100, where the valve scatters"

@@ -13,8 +13,9 @@ import pytest
 
 from config.writing import write_valve
 from workbench.blind.hiding import hide
-from workbench.fit.agreement import NEAR
 
+NEAR = 0.01
+"""Relative change of a parameter that is the same."""
 BLAS = ("Haswell", "Zen", "SkylakeX")
 """Kernels of OpenBLAS; one that the processor cannot run some builds replace, others end by an illegal instruction."""
 SEARCH = """
@@ -26,7 +27,7 @@ from config.valve_file import load_valve
 from workbench.fit.fitting import fit
 
 recording, valve = Recording.read(sys.argv[1]), load_valve(Path(sys.argv[2]))
-found = fit(recording, valve, effects=("area_variation",), workers=1, profile=False)
+found = fit(recording, valve, effects=("area_variation",), workers=1)
 parameters = {name: (each.value, each.std) for name, each in found.parameters.items()}
 print(json.dumps([found.cost, found.trusted, parameters]))
 """

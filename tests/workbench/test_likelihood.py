@@ -12,8 +12,8 @@ from tests.workbench.valves import NOISE_M, SEED, record_of, with_effect
 from workbench.data.record import Record, ready
 from workbench.fit.likelihood import Likelihood, soft
 from workbench.fit.onsets import with_onsets
+from workbench.fit.problem import problem
 from workbench.model.free_run import FreeRun
-from workbench.model.sampling import DYNAMIC
 from workbench.model.told_run import ToldRun, told_moves
 
 LAG = with_effect(SEED, "ip_lag", time_constant_s=0.15)
@@ -35,7 +35,7 @@ def recording(file: ValveFile, seed: int = 3) -> Recording:
 
 
 def likelihood(file: ValveFile, record: Record) -> Likelihood:
-    return Likelihood(Composition.from_file(file), record, told_moves(record), by=DYNAMIC)
+    return problem(record, file.valve).likelihood(Composition.from_file(file))
 
 
 @pytest.mark.parametrize("file", [SEED, LAG, with_effect(SEED, "preload", force_n=300.0)])

@@ -20,7 +20,7 @@ from workbench.fit.fitting import fit
 PAGE = Path(__file__).parents[2] / "docs" / "effects.md"
 BARE = drawn_valve(np.random.default_rng(11))
 SPOT = {"excess_n": 900.0, "position_m": 0.045, "width_m": 0.002}
-COUNT = 900
+COUNT = 1500
 
 
 @pytest.fixture(scope="module")

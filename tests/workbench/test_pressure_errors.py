@@ -73,7 +73,7 @@ def test_a_supply_limit_is_told_from_a_stop_by_the_measured_pressure() -> None:
 
 def test_zero_and_span_of_the_transmitter_are_not_held_against_a_valve() -> None:
     recording = recorded(BARE)
-    errors = pressure_errors(fit(recording, BARE, profile=False, workers=1), split([recording]))
+    errors = pressure_errors(fit(recording, BARE, workers=1), split([recording]))
     assert errors is not None
     assert errors.rms_pa == pytest.approx(NOISE_PA, rel=0.1)
 
@@ -83,7 +83,7 @@ def test_what_was_not_measured_is_held_against_no_valve() -> None:
     whole = recorded(BARE)
     kept_pa = np.where(np.arange(COUNT) % 500 < 250, whole.columns["pressure_pa"], np.nan)
     recording = Recording({**whole.columns, "pressure_pa": kept_pa})
-    errors = pressure_errors(fit(recording, BARE, profile=False, workers=1), split([recording]))
+    errors = pressure_errors(fit(recording, BARE, workers=1), split([recording]))
     assert errors is not None
     assert errors.rms_pa == pytest.approx(NOISE_PA, rel=0.1)
     assert errors.structured_pa < NOISE_PA
@@ -91,7 +91,7 @@ def test_what_was_not_measured_is_held_against_no_valve() -> None:
 
 def test_without_a_measured_pressure_nothing_is_said_of_it() -> None:
     recording = recorded(BARE, measured=False)
-    assert pressure_errors(fit(recording, BARE, profile=False, workers=1), split([recording])) is None
+    assert pressure_errors(fit(recording, BARE, workers=1), split([recording])) is None
 
 
 def test_the_one_with_the_most_evidence_gives_way_to_the_one_whose_pressure_was_measured() -> None:
@@ -153,9 +153,9 @@ def test_so_is_one_of_a_transmitter_whose_noise_hangs_together() -> None:
 def test_by_its_measured_pressure_a_form_is_sought_of_the_stem_alone(monkeypatch: pytest.MonkeyPatch) -> None:
     recording, sought = recorded(LIMITED), list[set[str]]()
 
-    def kept(search: FormSearch, base: EvaluatedModel, _told: object) -> SearchedForms:
+    def kept(search: FormSearch, _told: object, _most: int) -> SearchedForms:
         sought.append({each.place.function for each in search.forms.values()})
-        return SearchedForms(base, (), (), ())
+        return SearchedForms((), (), ())
 
     monkeypatch.setattr(FormSearch, "run", kept)
     found = [discover(recording, BARE, workers=1, from_pressure=driven) for driven in (False, True)]

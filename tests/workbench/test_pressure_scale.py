@@ -19,7 +19,7 @@ from workbench.diagnosis.diagnosis import diagnose
 from workbench.diagnosis.diagnosis_json import as_json
 from workbench.diagnosis.extension import extend
 from workbench.diagnosis.pressure_scale import pressure_scale
-from workbench.fit.fitting import local_fit
+from workbench.fit.fitting import fit
 from workbench.select.effect_search import evaluated
 
 RECORD = ready(recorded(BARE))
@@ -78,7 +78,7 @@ def test_without_a_pressure_there_is_none() -> None:
 
 def by_pressure(pressure_pa: Column) -> Recording:
     columns = {**recorded(BARE).columns, "pressure_pa": pressure_pa}
-    return Recording({name: column[:600] for name, column in columns.items()})
+    return Recording({name: column[:1000] for name, column in columns.items()})
 
 
 @pytest.mark.long
@@ -100,9 +100,9 @@ def test_nor_is_one_extended_without_a_word() -> None:
 def asked(pressure_pa: Column) -> ByCommand | None:
     """Ask the best that a valve is by such a pressure."""
     recording = by_pressure(pressure_pa)
-    found = local_fit(recording, BARE, free=("spring_n_per_m", "coulomb_n"), from_pressure=True)
+    found = fit(recording, BARE, workers=1, free=("spring_n_per_m", "coulomb_n"), from_pressure=True)
     parts = split([recording])
-    return by_command(evaluated(found, parts), parts, seed=0, workers=1, progress=lambda _what, _done: None)
+    return by_command(evaluated(found, parts), parts, workers=1, progress=lambda _what, _done: None)
 
 
 def test_a_pressure_that_lags_drives_no_stem() -> None:

@@ -36,7 +36,7 @@ def parts(sound: Hidden) -> Split:
 
 @pytest.fixture(scope="module")
 def found(sound: Hidden, parts: Split) -> Fit:
-    return fit(parts.train.recording, sound.base, from_pressure=True, profile=False)
+    return fit(parts.train.recording, sound.base, from_pressure=True)
 
 
 def test_a_sound_valve_is_off_by_what_its_transmitters_noise_does(parts: Split, found: Fit) -> None:
@@ -64,7 +64,7 @@ def test_a_stem_that_obeys_its_command_has_the_same_floor(parts: Split, found: F
 
 def test_a_quiet_transmitter_adds_nothing_to_the_floor(sound: Hidden) -> None:
     parts = split([sound.fit], sound.test)
-    found = fit(parts.train.recording, sound.base, from_pressure=True, profile=False)
+    found = fit(parts.train.recording, sound.base, from_pressure=True)
     with_it = with_pressure_scatter(parts, found)
     assert parts.floor_m is not None
     assert with_it.floor_m == pytest.approx(parts.floor_m, rel=0.03)

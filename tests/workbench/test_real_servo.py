@@ -140,8 +140,8 @@ def test_below_break_away_energy_is_lost() -> None:
 
 def test_a_drive_without_a_spring_is_fitted_as_such() -> None:
     springless = ValveFile.model_validate({"valve": MOTOR.valve.model_dump() | {"spring_n_per_m": 0.0}})
-    base = fit(recorded("J_7", 10), springless, profile=False)
-    found = fit(recorded("J_7", 10), springless, effects=["asymmetric_friction"], base=base, profile=False)
+    base = fit(recorded("J_7", 10), springless)
+    found = fit(recorded("J_7", 10), springless, effects=["asymmetric_friction"], base=base)
     assert "spring_n_per_m" not in found.parameters
     assert base.rms_m > 10.0
     assert found.rms_m < 0.6

@@ -3,24 +3,17 @@
 import numpy as np
 import pytest
 
-from benchmarks.searches import Case, posed
+from benchmarks.searches import Case, posed, true_cost
 from config.recording import Recording
-from config.valve_file import ValveFile
-from sim.composition import Composition
 from tests.workbench.slow_records import once_a_second
 from tests.workbench.valves import SEED
 from workbench.blind.hiding import hide
 from workbench.data.noise_floor import with_noise
 from workbench.data.record import ready
 from workbench.fit.fitting import fit
-from workbench.fit.objective import WITHIN, SimulationError
-from workbench.model.free_run import FreeRun
 
-
-def true_cost(recording: Recording, truth: ValveFile) -> float:
-    composition = Composition.from_file(truth)
-    error = SimulationError(FreeRun(composition, ready(recording)), composition, (), composition.theta)
-    return error.cost(np.zeros(0))
+WITHIN = 1.01
+"""Factor on the cost of the true parameters, within which a fit has come to them."""
 
 
 @pytest.mark.long
@@ -28,11 +21,11 @@ def true_cost(recording: Recording, truth: ValveFile) -> float:
 def test_where_a_sensor_rounds_a_trusted_fit_is_the_truth(seed: int) -> None:
     hidden = hide(seed)
     assert [each.name for each in hidden.truth.effect] == ["quantisation"]
-    base = fit(hidden.fit, hidden.base, workers=1, profile=False)
-    found = fit(hidden.fit, hidden.base, effects=("quantisation",), workers=1, base=base, profile=False)
+    base = fit(hidden.fit, hidden.base, workers=1)
+    found = fit(hidden.fit, hidden.base, effects=("quantisation",), workers=1, base=base)
     least = true_cost(hidden.fit, hidden.truth)
     assert found.cost < WITHIN * least or not found.trusted
-    assert found.cost < 1.1 * least, "a stair off at most"
+    assert found.cost < 1.1 * least
 
 
 @pytest.mark.long
@@ -40,8 +33,8 @@ def test_a_quantum_finer_than_the_noise_shows_is_not_trusted_however_many_search
     hidden = hide(52055)
     columns = {name: each[:652] for name, each in hidden.fit.columns.items()}
     recording = with_noise(Recording(columns, hidden.fit.metadata), 1.7e-4)
-    base = fit(recording, hidden.base, workers=1, profile=False)
-    found = fit(recording, hidden.base, effects=("quantisation",), workers=1, base=base, profile=False)
+    base = fit(recording, hidden.base, workers=1)
+    found = fit(recording, hidden.base, effects=("quantisation",), workers=1, base=base)
     assert found.parameters["quantisation.quantum_m"].value < ready(recording).scale_m
     assert found.cost < base.cost / WITHIN, "though it does better than the base"
     assert not found.trusted
@@ -56,21 +49,11 @@ def test_the_digits_of_a_file_are_no_rounding(digits: int, told: bool) -> None:
     assert any("is rounded to" in each for each in notes) == told
 
 
-@pytest.mark.parametrize("seed", [180522, 180209])
+@pytest.mark.parametrize("seed", [180522, 180209, pytest.param(160237, marks=pytest.mark.long)])
 def test_few_rests_are_rounded_as_the_sensor_does(seed: int) -> None:
-    """A third of the quantum came closer at the start; and a quantum of two noises was not sought about its end."""
     recording, valve, truth = posed(Case("quantisation", seed, "poor"))
-    base = fit(recording, valve, workers=1, profile=False)
-    found = fit(recording, valve, effects=("quantisation",), workers=1, base=base, profile=False)
+    base = fit(recording, valve, workers=1)
+    found = fit(recording, valve, effects=("quantisation",), workers=1, base=base)
     assert found.cost < WITHIN * true_cost(recording, truth)
     known_m = dict(truth.effect[0])["quantum_m"]
     assert found.parameters["quantisation.quantum_m"].value == pytest.approx(known_m, rel=1e-3)
-
-
-@pytest.mark.long
-def test_the_stairs_about_the_end_of_a_rounded_record_are_gone_over() -> None:
-    """They run through all parameters at once: places strewn at random ended 2.5 % above the truth, trusted."""
-    recording, valve, truth = posed(Case("quantisation", 160237, "full"))
-    base = fit(recording, valve, workers=1, profile=False)
-    found = fit(recording, valve, effects=("quantisation",), workers=1, base=base, profile=False)
-    assert found.cost < WITHIN * true_cost(recording, truth)

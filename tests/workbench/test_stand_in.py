@@ -45,10 +45,11 @@ def test_a_preload_that_imitates_an_asymmetry_which_was_not_tried_is_no_explanat
     monkeypatch.setattr(stand_in, "searched_forms", searched)
     monkeypatch.setattr(form_search, "FORMS", tuple(each for each in FORMS if each.name in FEW))
     found = diagnose(recording, valve, effects=("preload",))
-    assert found.best.complete, "it reaches the floor: by what is left alone it would be called all that is missing"
+    assert found.best.explained, "it reaches the floor: by what is left alone it would be called all that is missing"
     assert found.stand_in is not None
     assert (found.verdict, found.missing, found.stand_in.form) == ("unexplained", ("preload",), FEW[0])
-    assert found.stand_in.form_rmse_m < 0.8 * found.stand_in.named_rmse_m
+    assert found.best.fit.terms.landings.mean_square > 2.0, "slides end elsewhere, however small the error"
+    assert found.stand_in.form_rmse_m < found.stand_in.named_rmse_m
     assert found.sentence.endswith(f" {found.stand_in.sentence}.")
     assert "preload only stands in for it" in found.sentence
     assert as_json(found)["stand_in"]["form"] == FEW[0]

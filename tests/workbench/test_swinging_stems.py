@@ -49,11 +49,11 @@ def test_a_stem_that_swings_is_simulated_with_inertia_however_slowly_it_is_seen(
 
 
 def test_what_the_file_does_not_know_of_its_damping_the_fit_finds() -> None:
-    found = fit(staircase(SWINGING), SEED, profile=False)
+    found = fit(staircase(SWINGING), SEED)
     assert found.by.motion is Motion.DYNAMIC
     assert found.rms_m < 1.15 * NOISE_M, "0.3 mm and more without inertia"
     assert found.parameters["viscous_ns_per_m"].value == pytest.approx(SWINGING.valve.viscous_ns_per_m, rel=0.02)
 
 
 def test_what_is_at_the_floor_without_inertia_stays_so() -> None:
-    assert fit(staircase(SEED), SEED, profile=False).by.motion is Motion.QUASI_STATIC
+    assert fit(staircase(SEED), SEED).by.motion is Motion.QUASI_STATIC

@@ -22,8 +22,8 @@ ASYMMETRIC = with_effect(SEED, "asymmetric_friction", asymmetry=0.15)
 def test_a_held_command_seen_once_a_second_gives_the_asymmetry() -> None:
     recording = once_a_second(ASYMMETRIC)
     assert sampling(ready(recording), SEED.valve).motion is Motion.QUASI_STATIC
-    base = fit(recording, SEED, workers=1, profile=False)
-    found = fit(recording, SEED, effects=["asymmetric_friction"], base=base, workers=1, profile=False)
+    base = fit(recording, SEED, workers=1)
+    found = fit(recording, SEED, effects=["asymmetric_friction"], base=base, workers=1)
     assert "viscous_ns_per_m" not in found.parameters
     assert found.parameters["asymmetric_friction.asymmetry"].value == pytest.approx(0.15, abs=0.005)
     assert found.parameters["spring_n_per_m"].value == pytest.approx(SEED.valve.spring_n_per_m, rel=2e-3)
@@ -37,8 +37,8 @@ def test_a_command_that_changed_between_samples_is_judged_by_landings() -> None:
     assert found.motion is Motion.LANDINGS
     assert not found.held
     assert "landings" in found.sentence
-    base = fit(recording, SEED, workers=1, profile=False)
-    extended = fit(recording, SEED, effects=["asymmetric_friction"], base=base, workers=1, profile=False)
+    base = fit(recording, SEED, workers=1)
+    extended = fit(recording, SEED, effects=["asymmetric_friction"], base=base, workers=1)
     assert set(base.parameters) == {"spring_n_per_m", "coulomb_n"}
     assert extended.parameters["asymmetric_friction.asymmetry"].value == pytest.approx(0.15, abs=0.005)
     assert extended.rms_m < 1.15 * NOISE_M
@@ -47,7 +47,7 @@ def test_a_command_that_changed_between_samples_is_judged_by_landings() -> None:
 @pytest.mark.parametrize(("offset_s", "name"), [(0.0, "quadratic_drag"), (0.5, "quadratic_drag"), (0.5, "ip_lag")])
 def test_an_effect_that_cannot_show_is_refused_by_name(offset_s: float, name: str) -> None:
     recording = once_a_second(SEED, 100, offset_s=offset_s)
-    base = fit(recording, SEED, workers=1, profile=False)
+    base = fit(recording, SEED, workers=1)
     with pytest.raises(InputError, match=f"{name} cannot be fitted: it acts"):
         fit(recording, SEED, effects=[name], base=base, workers=1)
 

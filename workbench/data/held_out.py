@@ -48,8 +48,6 @@ class PressureScatter:
     """Standard deviation."""
     typical_m: float
     """In a typical second, rms."""
-    mistimed_m: float
-    """What it adds to that rms over all seconds: a stem that leaves at another time is off until it moves again."""
 
 
 @dataclass(frozen=True, slots=True, repr=False)

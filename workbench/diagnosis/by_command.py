@@ -36,7 +36,7 @@ class ByCommand(Brief):
         )
 
 
-def by_command(best: EvaluatedModel, parts: Split, *, seed: int, workers: int, progress: Progress) -> ByCommand | None:
+def by_command(best: EvaluatedModel, parts: Split, *, workers: int, progress: Progress) -> ByCommand | None:
     """Return what the best model by the measured pressure is by the command; None where it explains, or does as well.
 
     Nor is it asked of a set point, which is no pressure.
@@ -44,11 +44,10 @@ def by_command(best: EvaluatedModel, parts: Split, *, seed: int, workers: int, p
     Args:
         best: what was found.
         parts: of the record, fitted and held out.
-        seed: of the fit's draws.
         workers: threads.
         progress: called with what is under way, and the fraction done.
     """
     if not best.fit.from_pressure or best.explained or parts.train.record.by_setpoint:
         return None
-    model = driven_otherwise(best, parts, seed=seed, workers=workers, progress=progress)
+    model = driven_otherwise(best, parts, workers=workers, progress=progress)
     return ByCommand(best.errors.test_rmse_m, model) if outdoes(model, best) else None

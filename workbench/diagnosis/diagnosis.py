@@ -5,7 +5,7 @@ accepted (`effect_candidates`, by the rule of `effect_acceptance`), from all ste
 """
 
 from collections.abc import Callable, Mapping, Sequence
-from dataclasses import dataclass, field, replace
+from dataclasses import dataclass, field
 from os import cpu_count
 from typing import TYPE_CHECKING, NamedTuple
 
@@ -34,7 +34,6 @@ from workbench.fit.breaking_off import BrokenOff, ending
 from workbench.fit.fit_result import Fit
 from workbench.fit.threads import linear_algebra_alone
 from workbench.model.sampling import sampling
-from workbench.select.block_errors import with_rests
 from workbench.select.candidate_table import candidate_columns, candidate_table, draw_race, lengths
 from workbench.select.effect_candidates import EffectCandidate, EffectStep, EvaluatedModel
 from workbench.select.effect_search import EffectSearch, Progress, Race
@@ -203,7 +202,6 @@ def diagnose(
     *,
     test: Recording | None = None,
     effects: Sequence[str] | None = None,
-    seed: int = 0,
     workers: int | None = None,
     on_preview: Callable[[tuple[TangentScore, ...]], None] | None = None,
     progress: Progress | None = None,
@@ -220,7 +218,6 @@ def diagnose(
         valve: where the fit begins; its own effects stay.
         test: held out; by default the last third of the recording.
         effects: names, or paths of own effects' files, to be tried; by default all that come with the package.
-        seed: of the searches.
         workers: threads, by default one a core; the result does not depend on it.
         on_preview: given the tangent preview as soon as it is there.
         progress: called with what is being done, and the fraction of it done.
@@ -244,9 +241,7 @@ def diagnose(
     library = {each.written: each for each in named if each.written not in there and each.written not in unseen}
     threads = workers or cpu_count() or 1
     tell = progress or (lambda _what, _done: None)
-    search = EffectSearch(
-        parts, library, valve.valve, seed=seed, workers=threads, progress=tell, race=race, from_pressure=from_pressure
-    )
+    search = EffectSearch(parts, library, valve, workers=threads, progress=tell, race=race, from_pressure=from_pressure)
     with ending(over or (lambda: False)):
         base = search.base(valve)
         parts = search.split
@@ -255,20 +250,18 @@ def diagnose(
         try:
             if parts.train.record.by_setpoint and not from_pressure and not parts.early:
                 held = positioner_or_packing(
-                    parts, base, seed=seed, workers=threads, progress=lambda done: tell("positioner or packing", done)
+                    parts, base, workers=threads, progress=lambda done: tell("positioner or packing", done)
                 )
             first = {name: each for name, each in library.items() if each.after not in library}
-            scores = preview(base.fit, parts, first, threads)
+            scores = preview(base.fit, search.problem, first, threads)
             if on_preview:
                 on_preview(scores)
             steps = search.steps(base)
-            steps, base, best = search.proved(steps)
+            base, best = steps[0].before, _last(steps)
             landed = judged_landings(best.fit, parts)
             found = verdict(best, steps, parts.motion_std_m, parts.floor_m, landed, parts.early)
-            asked = _asked(found, best, steps, valve, library, parts, seed=seed, workers=threads, tell=tell)
+            asked = _asked(found, best, steps, valve, library, parts, workers=threads, tell=tell)
             found = "unexplained" if asked.stand_in else found
-            if found == "unexplained":
-                best = replace(best, errors=with_rests(best.errors, best.fit, parts))
             chosen = search.experiment(steps) if found == "one_of" else None
         except (BrokenOff, KeyboardInterrupt):
             steps, found, chosen, asked = search.so_far(base), "unfinished", None, Asked()
@@ -327,7 +320,6 @@ def _asked(
     library: Mapping[str, Effect],
     parts: Split,
     *,
-    seed: int,
     workers: int,
     tell: Progress,
 ) -> Asked:
@@ -337,13 +329,13 @@ def _asked(
     scale = pressure_scale(parts.train.record)
     if scale and best.fit.from_pressure:
         return Asked(scale=scale)
-    if commanded := by_command(best, parts, seed=seed, workers=workers, progress=tell):
+    if commanded := by_command(best, parts, workers=workers, progress=tell):
         return Asked(by_command=commanded)
     mass = kept_mass(best, parts, tell)
-    pressed = by_measured_pressure(best, parts, seed=seed, workers=workers, progress=tell)
+    pressed = by_measured_pressure(best, parts, workers=workers, progress=tell)
     if found not in EXPLAINED or mass or pressed:
         return Asked(mass, scale=scale) if pressed and scale else Asked(mass, pressed)
-    outdone = stand_in(best, steps, valve, library, parts, seed=seed, workers=workers, progress=tell)
+    outdone = stand_in(best, steps, valve, library, parts, workers=workers, progress=tell)
     return Asked(stand_in=outdone)
 
 

@@ -74,8 +74,6 @@ def _model(model: EvaluatedModel) -> dict[str, Any]:
         **_errors(model),
         "at_floor": model.at_floor,
         "structure_r2": model.errors.structure,
-        "rests_off_m": model.errors.rests.off_m if model.errors.rests else None,
-        "rests_scatter_m": model.errors.rests.scatter_m if model.errors.rests else None,
         "pressure_off_pa": model.pressure.rms_pa if model.pressure else None,
         "parameters": parameters_json(model.fit.parameters),
     }
@@ -100,7 +98,7 @@ def _candidate(candidate: EffectCandidate) -> dict[str, Any]:
         "test_typical_rmse_m": model and model.errors.test_block_m,
         "evidence": found and found.bic,
         "held_out_gain": found and found.held_out,
-        "held_out_standard_errors": found and found.standard_errors,
+        "held_out_evidence": found and found.held_out_evidence,
         "parameters": parameters_json(model.fit.parameters) if model else {},
         "physical": candidate.physical,
         "accepted": candidate.accepted,

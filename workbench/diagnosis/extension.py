@@ -22,7 +22,7 @@ from workbench.diagnosis.diagnosis import Diagnosis
 from workbench.diagnosis.pressure_scale import pressure_scale
 from workbench.fit.fit_result import Fit
 from workbench.fit.fitted_parameter import parameter_table
-from workbench.fit.fitting import fit, profiled
+from workbench.fit.fitting import fit
 from workbench.select.block_errors import BlockErrors, block_errors
 from workbench.select.effect_acceptance import Gain, gain
 from workbench.select.pressure_scatter import with_pressure_scatter
@@ -136,7 +136,6 @@ def extend(
     *,
     test: Recording | None = None,
     diagnosis: Diagnosis | None = None,
-    seed: int = 0,
     workers: int | None = None,
     progress: Progress | None = None,
     from_pressure: bool = False,
@@ -149,7 +148,6 @@ def extend(
         effects: names, or paths of own effects' files, to be added together; none: the valve is refitted as it is.
         test: held out; by default the last third of the recording.
         diagnosis: of the same recordings and valve: its fits are gone on from, so that nothing ends worse than there.
-        seed: of the searches.
         workers: threads, by default one a core.
         progress: called with what is being done, and the fraction of it done.
         from_pressure: the stem is driven by its measured pressure; the diagnosis, if any, says itself whether it is.
@@ -168,7 +166,6 @@ def extend(
         before = fit(
             train,
             valve,
-            seed=seed,
             workers=workers,
             from_pressure=from_pressure,
             progress=lambda done: tell("fitting without", done),
@@ -182,14 +179,13 @@ def extend(
             valve,
             effects=tuple(effects),
             base=before,
-            seed=seed,
             workers=workers,
             progress=lambda done: tell(f"fitting with {', '.join(effects)}", done),
         )
     on = with_pressure_scatter(on, before)
     there_already = diagnosis.fit_with(effects) if diagnosis and effects else None
     if there_already is not None and there_already.cost < after.cost:
-        after = profiled(there_already, train)
+        after = there_already
     before_errors = block_errors(before, on)
     given = AsGiven.of(valve, on, before).errors
     return Extension(

@@ -47,7 +47,7 @@ class ExtensionStep(Schema):
         said = (
             f"evidence {found.bic:.4g}; the error in a typical held-out second goes from "
             f"{length.number(before.test_block_m, '.4g')} to {length.said(after.test_block_m, '.4g')}, "
-            f"over all seconds by {found.standard_errors:.3g} standard errors"
+            f"held-out evidence {found.held_out_evidence:.3g}"
         )
         return cls(
             effects=extension.effects,

@@ -22,7 +22,7 @@ def as_json(extension: Extension) -> dict[str, Any]:
         "floor_m": extension.split.floor_m,
         "evidence": found.bic,
         "held_out_gain": found.held_out,
-        "held_out_standard_errors": found.standard_errors,
+        "held_out_evidence": found.held_out_evidence,
     }
 
 

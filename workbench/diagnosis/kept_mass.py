@@ -11,7 +11,7 @@ from dataclasses import dataclass
 from config.drive import Scale
 from config.results.result import Brief
 from workbench.data.held_out import Split
-from workbench.fit.fitting import local_fit
+from workbench.fit.fitting import base_fit, problem_of
 from workbench.select.block_errors import NOISE_KNOWN_TO, BlockErrors
 from workbench.select.effect_acceptance import gain
 from workbench.select.effect_candidates import EvaluatedModel
@@ -68,10 +68,10 @@ def kept_mass(best: EvaluatedModel, parts: Split, progress: Progress) -> KeptMas
         progress("fitting the mass, too", number / len(BEGINS))
         valve = before.valve.valve.model_copy(update={MASS: share * kept_kg})
         begin = before.valve.model_copy(update={"valve": valve})
-        found = local_fit(parts.train.recording, begin, free=free, from_pressure=before.from_pressure, by=before.by)
+        found = base_fit(problem_of(before, parts.train.record), begin, free=free)
         models.append(evaluated(found, parts))
     model = min(models, key=lambda each: each.fit.cost)
-    if gain(before, model.fit, best.errors, model.errors).rejection_reason(best.at_floor):
+    if gain(before, model.fit, best.errors, model.errors).rejection_reason:
         return None
     if not explains_most(best.errors, model.errors, best.floor_m):
         return None

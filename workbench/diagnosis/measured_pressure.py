@@ -62,7 +62,7 @@ class ByMeasuredPressure(Brief):
 
 
 def by_measured_pressure(
-    best: EvaluatedModel, parts: Split, *, seed: int, workers: int, progress: Progress
+    best: EvaluatedModel, parts: Split, *, workers: int, progress: Progress
 ) -> ByMeasuredPressure | None:
     """Return what the best model is from the measured pressure on; None where its own pressure is that one.
 
@@ -71,7 +71,6 @@ def by_measured_pressure(
     Args:
         best: what was found from the command on.
         parts: of the record, fitted and held out.
-        seed: of the fit's draws.
         workers: threads.
         progress: called with what is under way, and the fraction done.
     """
@@ -81,7 +80,7 @@ def by_measured_pressure(
     of_friction = valve.diaphragm_area_m2 * off_pa / valve.coulomb_n if valve.coulomb_n else 0.0
     if of_friction <= MATTERS:
         return None
-    model = driven_otherwise(best, parts, seed=seed, workers=workers, progress=progress)
+    model = driven_otherwise(best, parts, workers=workers, progress=progress)
     others = tuple(
         (name, before.value, after.value)
         for name, after in model.fit.parameters.items()
@@ -90,19 +89,15 @@ def by_measured_pressure(
     return ByMeasuredPressure(off_pa, of_friction, model, others, best.errors.test_rmse_m, outdoes(best, model))
 
 
-def driven_otherwise(
-    best: EvaluatedModel, parts: Split, *, seed: int, workers: int, progress: Progress
-) -> EvaluatedModel:
+def driven_otherwise(best: EvaluatedModel, parts: Split, *, workers: int, progress: Progress) -> EvaluatedModel:
     """Return a model fitted once more, by the command if it was by the measured pressure, and the other way round."""
     by_pressure = not best.fit.from_pressure
     what = f"fitting {'from the measured pressure' if by_pressure else 'by the command'}"
     found = fit(
         parts.train.recording,
         best.fit.valve,
-        seed=seed,
         workers=workers,
         from_pressure=by_pressure,
-        profile=False,
         progress=lambda done: progress(what, done),
     )
     return evaluated(found, parts)

@@ -31,21 +31,19 @@ from sim.effect import find_effect
 from workbench.data.held_out import Split
 from workbench.fit.fit_result import Fit
 from workbench.fit.fitting import fit
-from workbench.fit.setpoint_starts import FREE
+from workbench.model.parameters import BEHIND_POSITIONER as FREE
 from workbench.select.block_errors import block_errors
 from workbench.select.effect_acceptance import LEAST_BIC, Gain, gain
 from workbench.select.effect_candidates import EvaluatedModel
 
 Cause = Literal["packing", "positioner", "both", "at least packing", "at least positioner", "not told"]
 DEAD_BAND = "dead_band_m"
-AS_LOW = 1.25
-"""Factor on the cost of the best search."""
 HALF = 0.5
 """Of what is needed: so much of the other must be excluded, where that is not needed."""
 WORTH = 4.0
 """Times what is left, that friction found from a measured pressure must be worth."""
 ROUGH = "But the valve with both does not explain the recording: how much of either there is, these figures do not tell"
-NOTHING = Gain(0.0, 0.0, 0.0, 1.0)
+NOTHING = Gain(0.0, 0.0, 0.0)
 NO_FRICTION = 1e-3
 """Of the fitted one: what a stem without friction has left, by which it comes to rest."""
 
@@ -120,19 +118,18 @@ class PositionerOrPacking(Brief):
 
 
 def positioner_or_packing(
-    split: Split, both: EvaluatedModel, *, seed: int, workers: int, progress: Callable[[float], None] | None = None
+    split: Split, both: EvaluatedModel, *, workers: int, progress: Callable[[float], None] | None = None
 ) -> PositionerOrPacking:
     """Fit the valve without either, and judge what each is worth.
 
     Args:
         split: a recording of set point and travel.
         both: the fitted valve, with its positioner.
-        seed: of the searches.
         workers: threads.
         progress: called with the fraction done.
     """
     tell = progress or (lambda _: None)
-    refit = partial(fit, split.train.recording, seed=seed, workers=workers, profile=False)
+    refit = partial(fit, split.train.recording, workers=workers)
     if all(each.record.pressure_pa is not None for each in (split.train, split.test)):
         stem = refit(both.fit.valve, from_pressure=True)
         banded = refit(stem.valve, free=[each for each in both.fit.parameters if each not in FREE], progress=tell)
@@ -177,12 +174,11 @@ def _asked(
     found = cause(friction.gain, band.gain) if _found_twice(banded) else "not told"
     # What was fitted may speak for the other, though what was held out does not: then it is not said to be none.
     if found == "packing" and (
-        band.gain.independent_bic > LEAST_BIC or not _excluded(with_dead_band(HALF * play_m, 0.6), banded, split)
+        band.gain.bic > LEAST_BIC or not _excluded(with_dead_band(HALF * play_m, 0.6), banded, split)
     ):
         found = "at least packing"
     if found == "positioner" and (
-        friction.gain.independent_bic > LEAST_BIC
-        or not _excluded(with_friction(HALF * band_m * n_per_m, 0.6), stem, split)
+        friction.gain.bic > LEAST_BIC or not _excluded(with_friction(HALF * band_m * n_per_m, 0.6), stem, split)
     ):
         found = "at least positioner"
     return PositionerOrPacking(
@@ -203,7 +199,7 @@ def _asked(
 
 def _excluded(other: Fit, found: Fit, split: Split) -> bool:
     """Whether the recording speaks against another valve, by as many of its samples as are independent."""
-    return _worth(other, found, split).gain.independent_bic > LEAST_BIC
+    return _worth(other, found, split).gain.bic > LEAST_BIC
 
 
 class _Worth(NamedTuple):
@@ -224,7 +220,7 @@ def _worth(bare: Fit, full: Fit, split: Split) -> _Worth:
 
 def cause(friction: Gain, dead_band: Gain) -> Cause:
     """Return what the stem is held by, from what each is worth against the valve without it."""
-    needs_friction, needs_band = (not each.rejection_reason(at_floor=True) for each in (friction, dead_band))
+    needs_friction, needs_band = (not each.rejection_reason for each in (friction, dead_band))
     if needs_friction and needs_band:
         return "both"
     if needs_friction:
@@ -259,7 +255,7 @@ def _with_friction(valve: ValveFile, coulomb_n: float) -> ValveFile:
 
 def _found_twice(found: Fit) -> bool:
     """Whether a second search came as low; its parameters may differ in what the recording does not determine."""
-    return len(found.starts) > 1 and found.starts[1].cost <= AS_LOW * found.starts[0].cost
+    return found.trusted
 
 
 def _value(found: Fit, name: str) -> float:

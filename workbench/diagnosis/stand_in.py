@@ -1,17 +1,16 @@
 """Whether what was named only stands in for something: a form without a name does better, and acts elsewhere.
 
 Of a library that lacks the effect something else comes near, often to less than smooth friction leaves (`AT_FLOOR`).
-Where an explained record leaves more than the noise may be off by, the likeliest forms of the grammar
-(`workbench.discover`) are therefore fitted to the valve without what was named. One of them alone does better if
+Where an explained record leaves more than the noise may be off by, in its error or where its slides end, the likeliest
+forms of the grammar (`workbench.discover`) are therefore fitted to the valve without what was named. A form does better
+if it outdoes that (`workbench.select.effect_candidates.outdoes`): by more than 10 of evidence, and by more than two
+standard errors of the events' errors, fitted and held out.
 
-    BIC(named) - BIC(form) > 10     in independent samples, and
-    the block error, fitted and held out, falls by more than two standard errors
-
-for which what was fitted must leave more than the floor: else what is left is a held-out slip. It acts elsewhere if
-that is at another place on the path pressure, force, friction, motion, sensor than the one effect named, its rivals and
-what is the same by algebra. At the same place it is the same effect in another shape, and is not sought: forms of its
-kind, which come near, too, would leave no room among the likeliest for what it stands in for. One form that does better
-than several effects together makes stand-ins of them, wherever it acts.
+Where slides end is asked of a valve that repeats itself: one that does not ends them elsewhere by itself. A form acts
+elsewhere if that is at another place on the path pressure, force, friction, motion, sensor than the one effect named,
+its rivals and what is the same by algebra. At the same place it is the same effect in another shape, and is not sought:
+forms of its kind, which come near, too, would leave no room among the likeliest for what it stands in for. One form
+that does better than several effects together makes stand-ins of them, wherever it acts.
 """
 
 from collections.abc import Mapping, Sequence
@@ -24,6 +23,7 @@ from sim.effect import Effect
 from workbench.data.held_out import Split
 from workbench.diagnosis.kept_mass import leaves_something
 from workbench.discover.form_search import FIRST, searched_forms
+from workbench.select.block_errors import AT_FLOOR, NOISE_KNOWN_TO
 from workbench.select.effect_candidates import EffectStep, EvaluatedModel, outdoes
 from workbench.select.effect_search import Progress
 from workbench.select.equivalence import algebraic_class
@@ -61,7 +61,6 @@ def stand_in(
     library: Mapping[str, Effect],
     parts: Split,
     *,
-    seed: int,
     workers: int,
     progress: Progress,
 ) -> StandIn | None:
@@ -75,12 +74,12 @@ def stand_in(
         valve: as it was diagnosed.
         library: what was tried.
         parts: of the record, fitted and held out.
-        seed: of the searches.
         workers: threads.
         progress: called with what is under way, and the fraction done.
     """
     added = [step for step in steps if step.added]
-    if not added or not leaves_something(best) or best.fit.by.slow or parts.train.record.by_setpoint:
+    left = leaves_something(best) or _lands_elsewhere(best, parts)
+    if not added or not left or best.fit.by.slow or parts.train.record.by_setpoint:
         return None
     named = tuple(step.added.name for step in added if step.added)
     rivals = [each.name for step in added for each in step.indistinguishable]
@@ -89,9 +88,7 @@ def stand_in(
         parts,
         valve,
         steps[0].before,
-        against=best.fit.cost,
         most=FIRST,
-        seed=seed,
         workers=workers,
         progress=progress,
         elsewhere_than=places,
@@ -101,6 +98,12 @@ def stand_in(
         return None
     form, errors = better[0].form, better[0].model.errors
     return StandIn(named, form.name, form.words, best.errors.test_rmse_m, errors.test_rmse_m, best.fit.kind.length)
+
+
+def _lands_elsewhere(best: EvaluatedModel, parts: Split) -> bool:
+    """Whether slides of a valve whose floor is the noise end where the model has none, by more than noise explains."""
+    repeats = best.floor_m is not None and best.floor_m <= AT_FLOOR * parts.train.record.scale_m
+    return repeats and best.fit.terms.landings.mean_square > NOISE_KNOWN_TO**2
 
 
 def _places(name: str, library: Mapping[str, Effect]) -> set[str]:

@@ -55,7 +55,7 @@ def verdict(
 def _verdict_of_all(best: EvaluatedModel, steps: Sequence[EffectStep], motion_std_m: float) -> Verdict:
     equivalent = by_another_name(steps)
     best = equivalent.model if equivalent and equivalent.model and equivalent.model.explained else best
-    if best.explained and not (best.complete and best.errors.follows(motion_std_m)):
+    if best.explained and not best.errors.follows(motion_std_m):
         return "unexplained"
     added = [step for step in steps if step.added]
     if best.explained and not added:

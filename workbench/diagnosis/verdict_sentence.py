@@ -12,8 +12,8 @@ from workbench.diagnosis.as_given import AsGiven
 from workbench.diagnosis.judged_landings import unknown_between_samples
 from workbench.diagnosis.verdict import EXPLAINED, Verdict, by_another_name
 from workbench.fit.fit_result import Fit
-from workbench.select.block_errors import NOISE_KNOWN_TO, BlockErrors, told_sentence
-from workbench.select.effect_acceptance import LEAST_INDEPENDENT
+from workbench.select.block_errors import NOISE_KNOWN_TO, BlockErrors
+from workbench.select.effect_acceptance import LEAST_BIC
 from workbench.select.effect_candidates import EffectCandidate, EffectStep, EvaluatedModel
 from workbench.select.equivalence import classes, distinguishing_record
 from workbench.select.pressure_errors import PressureErrors
@@ -65,16 +65,16 @@ def _said(
         return f"{begun} {off}{apart}"
     suspicion = _suspicion(steps[-1].suspected)
     if verdict == "adequate":
-        said = _adequate(best.errors, parts, length, given) + told_sentence(best.errors, length)
+        said = _adequate(best.errors, parts, length, given)
         return said + suspicion + _scatter(parts, length)
     if verdict == "missing":
         said = f"Missing: {names}; {fell}, and {_left(best.errors, parts, steps[-1].suspected)}."
-        return said + by_pressure + told_sentence(best.errors, length) + suspicion
+        return said + by_pressure + suspicion
     if verdict == "one_of":
         all_known = _floors_left(best.errors, parts) <= NOISE_KNOWN_TO
         left = "" if all_known else f", and {_left(best.errors, parts, steps[-1].suspected)}"
         said = f"Missing: {names}{or_another}; {fell}{left}.{apart}{by_pressure}"
-        return said + told_sentence(best.errors, length) + suspicion
+        return said + suspicion
     several = sum(step.added is not None for step in steps) > 1
     lowers, explains = ("lower", "explain") if several else ("lowers", "explains")
     part = f"{lowers} it" if verdict in ("unjudged", "unfinished") else f"{explains} a part"
@@ -83,13 +83,13 @@ def _said(
         told = suspicion or any(each.physical and _tells(each) for each in steps[-1].candidates)
         lacked = "no effect here is proved to explain" if told else "the library does not have"
         said = f"Something is missing that {lacked}.{begun}"
-        return f"{said}{_elsewhere(best, names, length)}{suspicion}{repeat}{_scatter(parts, length)}"
+        return f"{said}{suspicion}{repeat}{_scatter(parts, length)}"
     return _unproved(verdict, best, steps, library, parts) + begun + (suspicion if verdict == "untrusted" else "")
 
 
 def _tells(candidate: EffectCandidate) -> bool:
     """Whether the fitted part has evidence for a candidate, in independent samples: it may be what is missing."""
-    return candidate.gain is not None and candidate.gain.independent_bic > LEAST_INDEPENDENT
+    return candidate.gain is not None and candidate.gain.bic > LEAST_BIC
 
 
 def floor_by_pressure(parts: Split, kind: Kind) -> list[str]:
@@ -131,7 +131,6 @@ def _kept_off(equivalent: EffectCandidate | None, best: EvaluatedModel) -> str:
     return (
         f"a parameter that was kept is off: with {equivalent.name}, the bare valve by another name, {fell}. "
         "Put the mass_kg that plate, stem and plug weigh into the valve file, and diagnose again."
-        f"{told_sentence(equivalent.model.errors, best.fit.kind.length)}"
     )
 
 
@@ -180,14 +179,12 @@ def _not_known(best: EvaluatedModel, parts: Split) -> str:
 
 
 def reduction_sentence(before: BlockErrors, after: BlockErrors, length: Scale) -> str:
-    """Say how the held-out error falls; where a narrowly mistimed slip outweighs all else, in a typical second."""
+    """Say how the held-out error falls; where one that went wrong outweighs all others, in a typical move."""
     whole = f"from {length.number(before.test_rmse_m)} to {length.said(after.test_rmse_m)}"
     if after.test_rmse_m < before.test_rmse_m:
         return f"the held-out error falls {whole}"
     typical = f"from {length.number(before.test_block_m)} to {length.said(after.test_block_m)}"
-    return (
-        f"the held-out error of a typical second falls {typical}, though a narrowly mistimed slip moves the rms {whole}"
-    )
+    return f"the held-out error of a typical move falls {typical}, though the rms rises {whole}"
 
 
 def rivals_sentence(names: Sequence[str], library: Mapping[str, Effect]) -> str:
@@ -218,20 +215,6 @@ def _by_pressure(step: EffectStep, kind: Kind) -> str:
 
 def _of(candidate: EffectCandidate) -> PressureErrors | None:
     return candidate.model.pressure if candidate.model else None
-
-
-def _elsewhere(best: EvaluatedModel, names: str, length: Scale) -> str:
-    """Say what tells where slides end elsewhere, with a leading space; empty where nothing does."""
-    rests = best.errors.rests
-    if rests is None or not (rests.elsewhere or rests.wander):
-        return ""
-    stands_in = f", for which {names} may stand in" if names else ""
-    off = f" Where the stem rests the model is off by {length.said(rests.off_m)}, besides noise;"
-    if rests.wander and rests.unsteady_m < rests.scatter_m:
-        left = length.said(rests.unsteady_m)
-        return f"{off} time tells all of it but {left}: a zero that drifts, or forces that change meanwhile{stands_in}."
-    left = length.said(rests.scatter_m)
-    return f"{off} place and direction tell all of it but {left}: a balance of forces that it lacks{stands_in}."
 
 
 def _suspicion(suspected: Sequence[EffectCandidate]) -> str:

@@ -1,8 +1,6 @@
 """The force that a form adds, over its variable; and what the balance of forces misses where slides end in rest.
 
-    missing_j = s_j F_c - (A p_j - k_s x_j + F)        N, at landing j; F what the valve's own effects add
-
-s_j last direction of motion, x_j where the stem rests, p_j the actuator pressure as it came to rest.
+missing_j = k_s (x_j - x'_j)      N, at landing j; x_j where the stem rests, x'_j where the model, told, slides to
 """
 
 from collections.abc import Mapping
@@ -15,26 +13,21 @@ from config.recording import Column
 from config.results.result import Brief
 from sim.composition import Composition
 from sim.effect import Effect, execute
-from sim.interpreted import interpreted
 from workbench.data.held_out import Split
 from workbench.discover.grammar import Form
 from workbench.fit.fit_result import Fit
-from workbench.fit.landings import rests
+from workbench.fit.fitting import problem_of
 from workbench.model.free_run import FreeRun
 
 POINTS = 201
 P_1_PA = 1e5
-SETTLED_PA = 200.0
-"""By how much the pressure may move between the last sample of a slide and the rest: else the landing is no balance."""
 
 
 @dataclass(frozen=True, slots=True)
 class Landing:
-    """Where a slide ended in rest, and the force that the balance misses there."""
+    """Where a slide ended in rest, and the force, towards opening, that the balance misses there."""
 
-    time_s: float
     position_m: float
-    pressure_pa: float
     direction: float
     missing_n: float
 
@@ -53,25 +46,18 @@ class AddedForce(Brief):
 
 
 def landings(fit: Fit, split: Split) -> list[Landing]:
-    """Return the landings of what was fitted, under a pressure that has settled, with what the fit misses there."""
-    record = split.train.record
-    composition = Composition.from_file(fit.valve)
-    run = FreeRun(composition, record, from_pressure=fit.from_pressure, by=fit.by)
-    pressure_pa = run.run(composition.theta).pressure_pa
-    laws = interpreted(composition.effects)
-    theta = composition.theta.tolist()
-    valve = laws.karnopp(theta)
-    state = np.zeros(composition.state_size)
+    """Return the landings of what was fitted, with what the fit misses there."""
+    record, composition = split.train.record, Composition.from_file(fit.valve)
+    like = problem_of(fit, record).likelihood(composition, tuple(fit.parameters))
+    off_m = like.at(composition.theta, fit.onsets_s).landings * like.landing_m
     found = []
-    for rest in rests(record):
-        stretch = pressure_pa[rest.moved : rest.first + 1]
-        if not rest.direction or not np.isfinite(stretch).all() or np.ptp(stretch) > SETTLED_PA:
+    for move, rest in zip(like.moves, like.layout.rest_after.tolist(), strict=True):
+        if rest < 0:
             continue
-        direction, p = float(rest.direction), float(stretch[-1])
-        stem = laws.Stem(float(record.time_s[rest.first]), rest.position_m, 0.0, p)
-        level_n, _ = laws.friction(valve.F_c, valve.F_s, direction, stem, theta, state)
-        missing_n = direction * level_n - laws.external_force(valve, stem, theta, state)
-        found.append(Landing(stem.t, rest.position_m, p, direction, float(missing_n)))
+        rows = record.position_m[move.after : move.until + 1][record.valid[move.after : move.until + 1]]
+        landed_m = float(np.median(rows))
+        direction = float(np.sign(landed_m - record.position_m[move.before]))
+        found.append(Landing(landed_m, direction, -fit.valve.valve.spring_n_per_m * float(off_m[rest])))
     return found
 
 
@@ -80,8 +66,8 @@ def variable_range(form: Form, fit: Fit, split: Split) -> tuple[float, float]:
     record = split.train.record
     composition = Composition.from_file(fit.valve)
     run = FreeRun(composition, record, from_pressure=fit.from_pressure, by=fit.by).run(composition.theta)
-    time_s = record.time_s
-    held = [float(time_s[each.end - 1] - time_s[each.first]) for each in rests(record)]
+    time_s, moves = record.time_s, problem_of(fit, record).told
+    rested_s = [float(time_s[each.before] - time_s[each.rested_from]) for each in moves]
     stem = run.stem_m / fit.valve.valve.stroke_m
     spans = {
         "position": _span(stem),
@@ -89,7 +75,7 @@ def variable_range(form: Form, fit: Fit, split: Split) -> tuple[float, float]:
         "speed": (0.0, _span(np.abs(run.velocity_m_per_s))[1]),
         "pressure": _span(run.pressure_pa / P_1_PA),
         "command": _span(record.command_pa),
-        "rest": (0.0, max(held, default=0.0)),
+        "rest": (0.0, max(rested_s, default=0.0)),
         "travel": (0.0, float(np.subtract(*_span(stem)[::-1]))),
         "direction": (-1.0, 1.0),
     }

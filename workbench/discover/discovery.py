@@ -2,7 +2,7 @@
 
 The valve is fitted as it is. If that leaves nothing to explain, no form is sought. Else forms of the grammar are
 ranked (`proposal`) and fitted one beside another, as effects' files, by the machinery of a diagnosis: the same
-searches, the same rule on what was held out, the same floor. A form is believed only if it passes that rule and
+likelihood, the same rule on what was held out, the same floor. A form is believed only if it passes that rule and
 leaves nothing to explain: a falling error alone proves nothing, of many forms less than of few. What does as well
 stands beside it.
 """
@@ -25,7 +25,6 @@ from workbench.discover.added_force import Landing, landings
 from workbench.discover.form_search import searched_forms
 from workbench.discover.found_form import FoundForm
 from workbench.fit.fitted_parameter import parameter_table
-from workbench.select.block_errors import told_sentence
 from workbench.select.candidate_table import candidate_columns, candidate_table, lengths
 from workbench.select.effect_candidates import EffectCandidate, EvaluatedModel
 from workbench.select.effect_search import EffectSearch, Progress
@@ -57,9 +56,7 @@ class Discovery(Result):
         floor = told(self.split.floor_m, length)
         match self.outcome:
             case "explained":
-                said = "nothing is left to explain: the valve as it is, refitted, is at the floor; no form is sought"
-                excepted = told_sentence(self.base.errors, length)
-                return f"{said}.{excepted}" if excepted else said
+                return "nothing is left to explain: the valve as it is, refitted, is at the floor; no form is sought"
             case "unjudged" if self.split.early:
                 return f"{self.split.early.sentence}. {SAME_CLOCK}"
             case "unjudged":
@@ -94,7 +91,7 @@ class Discovery(Result):
         if self.candidates:
             said.append(candidate_table([each.tried for each in self.candidates], lengths(kind), title))
         if self.untried:
-            said.append(f"not fitted in full, behind or not needed: {', '.join(self.untried)}")
+            said.append(f"not fitted: {', '.join(self.untried)}")
         return said
 
     def frame_columns(self) -> dict[str, list[object]]:
@@ -136,7 +133,6 @@ def discover(
     valve: ValveFile,
     *,
     test: Recording | None = None,
-    seed: int = 0,
     workers: int | None = None,
     from_pressure: bool = False,
     on_proposal: Callable[[tuple[str, ...]], None] | None = None,
@@ -148,7 +144,6 @@ def discover(
         recording: one or several.
         valve: where the fit begins; its own effects stay.
         test: held out; by default the last third of the recording.
-        seed: of the searches.
         workers: threads, by default one a core; the result does not depend on it.
         from_pressure: drive the stem by its measured pressure; no form is sought before that.
         on_proposal: given the forms' names, the likeliest first, as soon as they are there.
@@ -163,23 +158,13 @@ def discover(
         raise InputError("recording", "has a set point and no pressure: a form is sought where command_pa is there")
     threads = workers or cpu_count() or 1
     tell = progress or (lambda _what, _done: None)
-    search = EffectSearch(
-        parts, {}, valve.valve, seed=seed, workers=threads, progress=tell, from_pressure=from_pressure
-    )
+    search = EffectSearch(parts, {}, valve, workers=threads, progress=tell, from_pressure=from_pressure)
     base = search.base(valve)
     parts = search.split
-    if base.complete or parts.floor_m is None or parts.early:
-        return Discovery("explained" if base.complete and not parts.early else "unjudged", base, (), (), (), parts, ())
-    searched = searched_forms(
-        parts,
-        valve,
-        base,
-        seed=seed,
-        workers=threads,
-        progress=tell,
-        on_proposal=on_proposal,
-    )
+    if base.explained or parts.floor_m is None or parts.early:
+        return Discovery("explained" if base.explained and not parts.early else "unjudged", base, (), (), (), parts, ())
+    searched = searched_forms(parts, valve, base, workers=threads, progress=tell, on_proposal=on_proposal)
     found = searched.found
     outcome: Outcome = "none" if not found else "found" if len(found) == 1 else "one_of"
-    missing = tuple(landings(searched.base.fit, parts))
-    return Discovery(outcome, searched.base, found, searched.candidates, searched.untried, parts, missing)
+    missing = tuple(landings(base.fit, parts))
+    return Discovery(outcome, base, found, searched.candidates, searched.untried, parts, missing)

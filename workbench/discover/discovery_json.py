@@ -22,8 +22,8 @@ def as_json(found: Discovery) -> dict[str, Any]:
                 "test_rmse_m": each.model and each.model.errors.test_rmse_m,
                 "evidence": each.gain and each.gain.bic,
                 "held_out_gain": each.gain and each.gain.held_out,
-                "held_out_standard_errors": each.gain and each.gain.standard_errors,
-                "explains": each.model is not None and each.model.complete,
+                "held_out_evidence": each.gain and each.gain.held_out_evidence,
+                "explains": each.model is not None and each.model.explained,
                 "accepted": each.accepted,
                 "why_not": each.rejection_reason,
             }

@@ -6,6 +6,4 @@ Its files:
     measured_pressure                             the rivals by the measured pressure, where there is one
     experiment_design                             the input that tells rivals apart, designed
     rival_race                                    the rivals weighed against each other in all recordings so far
-    slip_evidence                                 what slips say of a rival: balances, whatever came between
-    slip_promise                                  what the slips of an experiment promise to say
 """

@@ -12,7 +12,7 @@ experiment is played for them.
 """
 
 from collections.abc import Callable, Mapping, Sequence
-from dataclasses import dataclass, field, replace
+from dataclasses import dataclass, replace
 from math import inf, log
 from typing import TYPE_CHECKING, Any, Literal
 
@@ -26,11 +26,9 @@ from workbench.diagnosis.diagnosis import Diagnosis
 from workbench.discriminate.experiment_design import (
     IMITATED,
     MOST_MOVES,
-    WAYS,
     Bounds,
     DesignedExperiment,
     Terms,
-    Way,
 )
 from workbench.discriminate.measured_pressure import raced_by_pressure
 from workbench.discriminate.rival_race import ODDS, RivalRace
@@ -45,13 +43,9 @@ if TYPE_CHECKING:
 BUDGET = 60
 """Moves."""
 FEW_MOVES, SURE = 3, 3.0
-"""An experiment of few moves will do if it promises so many times the log odds wanted."""
-NOTHING = 0.5
-"""Log odds that a whole budget of moves must promise."""
+"""An experiment of few moves will do if a rival's cost is so many times the valve's that answered."""
 LEAST_TOLD = 0.25
-"""Of what was expected of it, and of the log odds wanted: a way of telling that has come to less waits."""
-PATIENCE: Mapping[Way, int] = {"run": 1, "slips": 2}
-"""Experiments after which that is asked."""
+"""Of the log odds wanted, or of what an experiment promised: an input that told less waits until all have told."""
 
 Outcome = Literal["resolved", "one_class", "not_separable", "budget_spent", "unexplained", "stopped"]
 
@@ -72,55 +66,9 @@ Designer = Callable[[RivalRace, Terms], DesignedExperiment | None]
 """Chooses the next experiment; None if none is allowed."""
 
 
-def by_run_or_slips(race: RivalRace, terms: Terms) -> DesignedExperiment | None:
-    """Return the experiment that its run or its slips recommend, whichever promises more a move."""
-    ways: Mapping[Way, Callable[[Terms], DesignedExperiment | None]] = {
-        "run": race.run_experiment,
-        "slips": race.slip_experiment,
-    }
-    asked = [chosen for way, designed in ways.items() if way in terms.ways and (chosen := designed(terms))]
-    return max(asked, key=lambda each: race.promised_by(each, terms.most_moves), default=None)
-
-
-@dataclass(slots=True)
-class Waiting:
-    """What waits, for it has told less than was expected of it: ways of telling, and the inputs of runs by name.
-
-    Where the valve scatters the promise of a run, worked out under few draws of that noise, is often not kept, whatever
-    its course; and one that told little will not tell more by being played again. Slips promise a mean, about which
-    luck scatters by as much.
-    """
-
-    runs: set[str] = field(default_factory=set)
-    ways: set[Way] = field(default_factory=set)
-    _lately: dict[Way, list[tuple[float, float]]] = field(default_factory=dict)
-    """What was expected and what was told, experiment by experiment."""
-
-    def __bool__(self) -> bool:
-        return bool(self.runs or self.ways)
-
-    def heard(self, chosen: DesignedExperiment, expected: float, told: float) -> None:
-        """Take in by how much an experiment was to change the log odds, and by how much it did."""
-        way = chosen.way
-        lately = [*self._lately.get(way, []), (min(expected, log(ODDS)), told)][-PATIENCE[way] :]
-        self._lately[way] = lately
-        wanted, changed = (sum(each) for each in zip(*lately, strict=True))
-        if len(lately) < PATIENCE[way] or abs(changed) >= LEAST_TOLD * wanted:
-            return
-        self.ways.add(way)
-        if way == "run":
-            self.runs.add(chosen.course.name)
-        if self.ways == WAYS:
-            self._wake()
-
-    def _wake(self) -> None:
-        self.ways.clear()
-        self._lately.clear()
-
-    def clear(self) -> None:
-        """Nothing waits any more."""
-        self._wake()
-        self.runs.clear()
+def by_design(race: RivalRace, terms: Terms) -> DesignedExperiment | None:
+    """Return the experiment that separates the likeliest rivals the most."""
+    return race.experiment(terms)
 
 
 @dataclass(frozen=True, slots=True)
@@ -252,7 +200,7 @@ def discriminate(
     library: Mapping[str, Effect],
     *,
     budget: int = BUDGET,
-    design: Designer = by_run_or_slips,
+    design: Designer = by_design,
     seed: int = 0,
     workers: int | None = None,
     on_round: Callable[[Round], None] | None = None,
@@ -268,7 +216,7 @@ def discriminate(
         library: the effects by name.
         budget: moves allowed.
         design: chooses the next experiment.
-        seed: of the designs and searches.
+        seed: of the designs.
         workers: threads, by default one a core.
         on_round: told each round when it is weighed.
         progress: called with what is being done, and the fraction of the budget used; 1 where a round ends.
@@ -279,19 +227,18 @@ def discriminate(
     gathered = tuple(tuple(sorted(each, key=list(fits).index)) for each in classes(fits, library))
     if len(gathered) > 1:
         fits = raced_by_pressure(fits, recordings, library, workers)
-    race = RivalRace({each[0]: fits[each[0]] for each in gathered}, tuple(recordings), seed, workers)
+    race = RivalRace({each[0]: fits[each[0]] for each in gathered}, tuple(recordings), workers)
     rounds: list[Round] = []
     experiments: list[Recording] = []
     outcome: Outcome | None = "one_class" if len(gathered) == 1 else None
     problem, used = "", 0
-    waiting = Waiting()
+    waiting: set[str] = set()
     tell = progress or (lambda _what, _done: None)
     while outcome is None:
         left, number = budget - used, len(rounds) + 1
         tell(f"choosing experiment {number}", used / budget)
-        terms = Terms(bounds, left, seed + len(rounds), frozenset(waiting.runs), WAYS - waiting.ways)
-        chosen = _chosen(race, terms, design)
-        if chosen is None or _promises_nothing(race, chosen, budget):
+        chosen = _chosen(race, Terms(bounds, left, seed + len(rounds), frozenset(waiting)), design)
+        if chosen is None or chosen.separation < IMITATED:
             if waiting:
                 waiting.clear()
                 continue
@@ -305,9 +252,10 @@ def discriminate(
         experiments.append(played.recording)
         used += chosen.course.moves
         tell(f"refitting the rivals to experiment {number}", used / budget)
-        before = race
+        before = race.odds
         race = race.with_recording(played.recording)
-        waiting.heard(chosen, before.expected(chosen), race.told_since(before))
+        if abs(log(max(race.odds, 1e-9)) - log(max(before, 1e-9))) < LEAST_TOLD * log(ODDS):
+            waiting.add(chosen.course.name)
         rounds.append(Round(chosen.course.name, chosen.separation, used, race.relative))
         tell(f"experiment {number} weighed", 1.0)
         if on_round:
@@ -317,25 +265,16 @@ def discriminate(
     return Discrimination(outcome, named, gathered, tuple(rounds), race.odds, race.fits, tuple(experiments), problem)
 
 
-def _promises_nothing(race: RivalRace, chosen: DesignedExperiment, budget: int) -> bool:
-    """Whether it would tell nothing, repeated for a whole budget: what is left of it says nothing of the valve."""
-    return chosen.separation < IMITATED and race.promised_by(chosen, budget) < NOTHING
-
-
 def _chosen(race: RivalRace, terms: Terms, design: Designer) -> DesignedExperiment | None:
-    """Return the shortest experiment that promises the odds by itself, or the one that promises most if repeated.
-
-    Where the valve scatters none promises them, for what it repeats no better than its noise says little; nor does the
-    promise say much, worked out under few draws of that noise. So experiments go on as long as there are moves left.
-    """
-    best, left = None, terms.most_moves
-    for most in sorted({min(each, left) for each in (FEW_MOVES, MOST_MOVES)}):
+    """Return the shortest experiment that will do by what it separates, or else the one that separates most."""
+    best = None
+    for most in sorted({min(each, terms.most_moves) for each in (FEW_MOVES, MOST_MOVES)}):
         chosen = design(race, replace(terms, most_moves=most))
         if chosen is None:
             continue
-        if race.promised(chosen) >= SURE * log(ODDS):
+        if chosen.separation >= SURE:
             return chosen
-        if best is None or race.promised_by(chosen, left) > race.promised_by(best, left):
+        if best is None or chosen.separation > best.separation:
             best = chosen
     return best
 

@@ -8,14 +8,14 @@ A valve A answers a course, under a pressure noise that makes it repeat itself n
 and its rival B are refitted to the answer by one Gauss-Newton step, each held to what the recordings so far say of its
 parameters z:
 
-    dz = argmin |r + J dz|^2 + dz' H dz,   e = r + J dz     r residuals, H = J' J over the recordings
+    dz = argmin |r + J dz|^2 + dz' H dz,   e = r + J dz     r residuals, told when the stem moves; H = J' J over the
+                                                            recordings
     separation = C(e_B) / C(e_A)     C soft-L1 cost; both ways in the geometric mean, least of all pairs told apart
     sigma_p = k_s / A sqrt(sigma^2 - sigma_sensor^2)     of the noise, an autoregression of 0.2 s; sigma floor
 
-The best few, and the best of the menu as they are, are then refitted in full, by descents from wide to narrow under
-other noise, the better half under more of it, and the one with the largest separation is chosen: by how many times a
-refitted rival is worse off than the valve that answered. A slip that only luck decides mistimes both, and separates
-nothing.
+The best few, and the best of the menu as they are, are then refitted in full under other noise, the better half under
+more of it, and the one with the largest separation is chosen: by how many times a refitted rival is worse off than the
+valve that answered.
 
 Every course stays inside its bounds: pressures, rate, length; and every rival says that the stem stays in its window.
 """
@@ -25,7 +25,6 @@ from dataclasses import dataclass, replace
 from functools import cached_property
 from itertools import pairwise
 from math import exp, inf, log
-from typing import Literal
 
 import numpy as np
 from numpy.typing import NDArray
@@ -38,12 +37,12 @@ from sim.karnopp import Vector
 from sim.open_loop import respond
 from workbench.data.noise_floor import with_noise
 from workbench.data.record import Record, ready
-from workbench.fit.descent import descended_through
 from workbench.fit.fit_result import Fit
-from workbench.fit.objective import FINAL, SimulationError, soft
+from workbench.fit.fitting import problem_of
+from workbench.fit.likelihood import Likelihood, soft
+from workbench.fit.minimiser import derivatives, ended
+from workbench.fit.onsets import with_onsets
 from workbench.fit.threads import on_threads
-from workbench.model.free_run import FreeRun
-from workbench.model.parameters import free_parameters
 from workbench.select.experiment import LENGTH_S, MARGIN, MENU, REST_S, Command, Experiment, Shape
 
 MOST_MOVES = 8
@@ -52,8 +51,6 @@ TRIED, KEPT = 25, 2
 """Changes tried of each course of the menu that is kept; how many are, changed and as they are."""
 WINDOWS = 3
 """Courses cut out of an input of the menu."""
-DIFFERENCE = 1e-3
-"""Of a log-parameter, for the one step: wide enough to see across a stair."""
 SEARCHED, CHECKED = (1, 2), (3, 4, 5)
 """Draws of the noise for which a course is sought, and for which the best are refitted in full."""
 IMITATED = 1.001
@@ -61,10 +58,6 @@ IMITATED = 1.001
 CORRELATION_S = 0.2
 SHORTEST_S = 0.05
 """Of a leg."""
-
-Way = Literal["run", "slips"]
-"""By what an experiment is to tell rivals apart."""
-WAYS: frozenset[Way] = frozenset({"run", "slips"})
 
 
 @dataclass(frozen=True, slots=True)
@@ -81,14 +74,13 @@ class Bounds:
 
 @dataclass(frozen=True, slots=True)
 class Terms:
-    """On which the next experiment is chosen: its bounds, its moves, inputs whose runs are not asked, its ways."""
+    """On which the next experiment is chosen: its bounds, its moves, inputs that are not asked."""
 
     bounds: Bounds
     most_moves: int = MOST_MOVES
     seed: int = 0
     """Of the changes tried, and of the noise under which rivals answer."""
     without: frozenset[str] = frozenset()
-    ways: frozenset[Way] = WAYS
 
 
 @dataclass(frozen=True, slots=True)
@@ -167,13 +159,6 @@ class DesignedExperiment(Brief):
 
     course: Course
     separation: float
-    by_slips: float = 0.0
-    """By how much its slips promise to raise the log odds of the least distinct pair; 0: nobody has asked."""
-
-    @property
-    def way(self) -> Way:
-        """By what it is to tell."""
-        return "slips" if self.by_slips else "run"
 
     def experiment(self, period_s: float) -> Experiment:
         """Return it as an input sampled at a period, s."""
@@ -328,7 +313,7 @@ class Rivalry:
         self._bounds = terms.bounds
         self._seed = terms.seed
         self._compositions = [Composition.from_file(each.valve) for each in fits]
-        self._names = [tuple(each.parameters) for each in fits]
+        self._fits = list(fits)
         self._sigma_m = max(record.floor_or_scale_m, min(each.rms_m for each in fits))
 
     @cached_property
@@ -391,31 +376,33 @@ class Rivalry:
         spread_m = np.sqrt(max(0.0, self._sigma_m**2 - self._record.scale_m**2))
         return float(theta[SPRING] / theta[AREA] * spread_m)
 
-    def _error(self, i: int, record: Record) -> SimulationError:
-        composition = self._compositions[i]
-        parameters = free_parameters(composition, self._names[i])
-        return SimulationError(FreeRun(composition, record), composition, parameters, composition.theta)
+    def _like(self, i: int, record: Record) -> Likelihood:
+        fit = self._fits[i]
+        return problem_of(fit, record).likelihood(self._compositions[i], tuple(fit.parameters))
 
     def _known(self, i: int) -> NDArray[np.float64]:
         """Return H of a rival: what the recordings so far say of its parameters, in units of the sensor's noise."""
-        error = self._error(i, self._record)
-        z = error.coordinates(self._compositions[i].theta)
-        J = error.jacobian(z, error.residuals(z), DIFFERENCE)
-        return np.asarray(J.T @ J + np.eye(z.size))
+        like, theta = self._like(i, self._record), self._compositions[i].theta
+        onsets_s, _ = with_onsets(like, theta)
+        J = derivatives(like, like.coordinates(theta), onsets_s)[:, : len(like.parameters)]
+        return np.asarray(J.T @ J + np.eye(J.shape[1]))
 
     def _after_step(self, answer: Record, j: int) -> float:
-        """Return C after one step."""
-        error = self._error(j, answer)
-        z = error.coordinates(self._compositions[j].theta)
-        r = error.residuals(z)
-        J = error.jacobian(z, r, DIFFERENCE)
+        """Return C after one step, the onsets as they suit the valve."""
+        like, theta = self._like(j, answer), self._compositions[j].theta
+        onsets_s, groups = with_onsets(like, theta)
+        r = groups.whole
+        J = derivatives(like, like.coordinates(theta), onsets_s)[:, : len(like.parameters)]
         dz = -np.linalg.solve(J.T @ J + self._information[j], J.T @ r)
-        return min(soft(r, FINAL), soft(r + J @ dz, FINAL))
+        return float(min(soft(r).sum(), soft(r + J @ dz).sum()))
 
     def _after_refit(self, answer: Record, j: int) -> float:
-        """Return C after a refit in full."""
-        held = _Held(self._error(j, answer), self._information[j], self._compositions[j].theta)
-        return soft(held.of_record(descended_through(held, held.middle)), FINAL)
+        """Return C after a fit in full, the parameters held to what the recordings so far say of them."""
+        like, theta = self._like(j, answer), self._compositions[j].theta
+        z = like.coordinates(theta)
+        root = np.asarray(np.linalg.cholesky(self._information[j]).T, dtype=np.float64)
+        held = ended(like, z, with_onsets(like, theta)[0], held=(z, root))
+        return float(soft(held.groups.whole).sum())
 
 
 def _autoregression(generator: np.random.Generator, count: int, period_s: float) -> Vector:
@@ -426,22 +413,3 @@ def _autoregression(generator: np.random.Generator, count: int, period_s: float)
     fresh = generator.standard_normal(count)
     fresh[1:] *= np.sqrt(1.0 - kept**2)
     return np.asarray(lfilter([1.0], [1.0, -kept], fresh), dtype=np.float64)
-
-
-class _Held(SimulationError):
-    """The error of a rival in an answer, and of its parameters in the recordings before: z - z_0 by the root of H."""
-
-    def __init__(self, error: SimulationError, information: NDArray[np.float64], theta: Vector) -> None:
-        super().__init__(error.run, error.composition, error.parameters, theta)
-        self.middle = self.coordinates(theta)
-        self._root = np.linalg.cholesky(information).T
-
-    def of_record(self, z: Vector) -> Vector:
-        """Return the residuals in the answer alone."""
-        return super().compared(z, FINAL, inf)[0]
-
-    def compared(self, z: Vector, scale: float, limit: float) -> tuple[Vector, float]:
-        """Return those, and what moving the parameters costs."""
-        errors, cost = super().compared(z, scale, limit)
-        moved = self._root @ (z - self.middle)
-        return np.concatenate([errors, moved]), cost + soft(moved, scale)

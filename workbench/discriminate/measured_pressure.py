@@ -13,9 +13,12 @@ import numpy as np
 from config.recording import Recording
 from sim.effect import Effect
 from workbench.data.held_out import joined
+from workbench.data.record import ready
 from workbench.fit.fit_result import Fit
-from workbench.fit.fitting import local_fit
+from workbench.fit.fitting import base_fit
+from workbench.fit.problem import Problem
 from workbench.fit.threads import on_threads
+from workbench.model.told_run import told_moves
 
 MOSTLY = 0.9
 """Of the samples."""
@@ -35,11 +38,12 @@ def raced_by_pressure(
     on_path = {name for name, each in library.items() if "pressure" in each.functions}
     if on_path & fits.keys() or any(each.by.slow for each in fits.values()) or not all(map(_is_measured, recordings)):
         return fits
-    whole = joined(recordings)
+    record = ready(joined(recordings))
 
-    def refitted(fit: Fit) -> Fit:
-        free = [name for name in fit.parameters if name.partition(".")[0] not in on_path]
-        return local_fit(whole, fit.valve, free=free, from_pressure=True, by=fit.by)
+    def refitted(found: Fit) -> Fit:
+        free = [name for name in found.parameters if name.partition(".")[0] not in on_path]
+        driven = Problem(record, told_moves(record), found.by, from_pressure=True, load_n=found.load_n)
+        return base_fit(driven, found.valve, free=free)
 
     found = dict(zip(fits, on_threads(refitted, list(fits.values()), workers), strict=True))
     least_m, before_m = (min(fit.rms_m for fit in each.values()) for each in (found, fits))

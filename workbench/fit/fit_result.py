@@ -1,8 +1,9 @@
 """What a fit comes to: a valve, its parameters with their intervals, the searches behind it."""
 
-from collections.abc import Mapping, Sequence
-from dataclasses import dataclass, field, replace
-from typing import TYPE_CHECKING
+from collections.abc import Mapping
+from dataclasses import dataclass, field
+from math import log
+from typing import TYPE_CHECKING, NamedTuple
 
 import numpy as np
 
@@ -12,14 +13,17 @@ from config.recording import Column, Recording
 from config.results.block import Block
 from config.results.result import Result
 from config.valve_file import ValveFile
-from sim.composition import STATIC, Composition
+from signals.independence import independent_share
+from sim.composition import Composition
 from sim.karnopp import Vector
 from workbench.compare.comparison_sentences import shortened
 from workbench.compare.measures import fit_percent
 from workbench.data.noise_floor import told
 from workbench.data.record import Record, ready
 from workbench.fit.fitted_parameter import Fitted, draw_parameters, parameter_columns, parameter_table
-from workbench.fit.objective import SimulationError
+from workbench.fit.likelihood import Groups, Likelihood, soft
+from workbench.fit.minimiser import End
+from workbench.fit.problem import Problem
 from workbench.fit.uncertainty import Combination, Uncertainty, uncertainty
 from workbench.model.free_run import FreeRun
 from workbench.model.sampling import DYNAMIC, Sampling
@@ -27,22 +31,42 @@ from workbench.model.sampling import DYNAMIC, Sampling
 if TYPE_CHECKING:
     from matplotlib.figure import Figure
 
-ELSEWHERE = 0.01
-"""Of a log-parameter: searches that end nearer to each other have found the same place."""
-FLAT = 0.5
-"""Rise of the cost that is nothing: within it static friction is put in the middle."""
 AT_BOUND = 1e-3
+"""Of a coordinate's range, within which it is at the end of it."""
 WANTS_OUT = 2.0
-"""Slope of the cost at the bound times the deviation, in rises of 95 %: the least lies four deviations beyond it."""
+"""Slope of the cost at the end, in deviations: the least lies beyond it."""
+
+
+class Term(NamedTuple):
+    """What one kind of residual says: how many are independent, and their mean square, soft, at least the noise's."""
+
+    independent: float
+    mean_square: float
 
 
 @dataclass(frozen=True, slots=True)
-class Search:
-    """What one search came to."""
+class Terms:
+    """The likelihood of a fit, kind by kind (`workbench.fit.likelihood`)."""
 
-    cost: float
-    rms_m: float
-    parameters: Mapping[str, float]
+    motion: Term
+    landings: Term
+    rests: Term
+    break_aways: Term
+
+    def nats_above(self, other: "Terms") -> float:
+        """Return the log-likelihood of these less that of another fit's, each kind at the scale that it leaves."""
+        pairs = zip(self.each, other.each, strict=True)
+        return 0.5 * sum(min(a.independent, b.independent) * log(b.mean_square / a.mean_square) for a, b in pairs)
+
+    @property
+    def each(self) -> tuple[Term, ...]:
+        """All four."""
+        return self.motion, self.landings, self.rests, self.break_aways
+
+    @property
+    def events(self) -> float:
+        """Landings and break-aways: the independent things that the parameters of a valve follow from."""
+        return self.landings.independent + self.break_aways.independent
 
 
 @dataclass(frozen=True, slots=True, repr=False)
@@ -55,26 +79,28 @@ class Fit(Result):
     floor_m: float | None
     """The error that no model undercuts: noise, or repeatability where the command repeats itself; None: unknown."""
     cost: float
-    """Soft-L1 cost of scale 5, in units of the noise; half the number of samples for white residuals."""
+    """Soft-L1 cost of scale 5 of the residuals, in units of the noise; half their number where they are white."""
     count: int
-    """Valid samples."""
-    starts: tuple[Search, ...]
-    """The searches, best first."""
+    """Residuals."""
+    terms: Terms = field(repr=False)
+    moves: int
+    """How often the stem moves in what was fitted."""
     agreement: int
-    """From how many independent starts searches came to the best, in cost and in parameters (`agreement`); 1 where an
-    added effect makes nothing better, or rounds more finely than the noise shows."""
+    """From how many starts searches came to the best cost."""
     condition: float
     undetermined: tuple[Combination, ...]
     notes: tuple[str, ...]
     from_pressure: bool
-    seeds: tuple[Vector, ...] = field(repr=False)
-    """Parameter vectors at which an effect is added: the best search's, another's that ended elsewhere, the origins."""
+    onsets_s: Vector = field(repr=False)
+    """When each move begins, s."""
+    load_n: float = field(repr=False)
+    """To which a break-away tells static friction, N."""
     by: Sampling = DYNAMIC
     """How the recording was simulated."""
 
     @property
     def trusted(self) -> bool:
-        """Whether searches from more than one independent start came to the same cost and parameters."""
+        """Whether searches from more than one start came to the same."""
         return self.agreement > 1
 
     @kinds_held
@@ -132,104 +158,69 @@ class Fit(Result):
         return draw_parameters(self.parameters, self.kind)
 
 
-def fit_at(
-    error: SimulationError, composition: Composition, ends: Sequence[Vector], agreement: int, *, profile: bool
-) -> Fit:
-    """Return the fit by what searches came to.
-
-    Args:
-        error: of the free run that was fitted.
-        composition: the valve.
-        ends: coordinates of where the searches stay, best first.
-        agreement: from how many independent starts they came to the best.
-        profile: follow the cost for the intervals; else they are those of the derivatives.
-    """
-    best = _centred(error, ends[0])
-    determined = uncertainty(error, best, ends, profile=profile)
+def fit_at(problem: Problem, like: Likelihood, end: End, agreement: int) -> Fit:
+    """Return the fit of where searches have ended, from so many starts."""
+    determined = uncertainty(like, end)
+    theta, record = like.theta(end.z), problem.record
+    error_m = like.run.run(theta, end.onsets_s).indicated_m - record.position_m
     return Fit(
-        composition.file(error.theta(best)),
-        {each.name: _fitted(error, best, determined, i) for i, each in enumerate(error.parameters)},
-        error.rms_m(best),
-        error.run.record.floor_m,
-        error.cost(best),
-        error.count,
-        tuple(_search(error, z) for z in ends),
-        agreement,
-        determined.condition,
-        determined.undetermined,
-        error.run.record.notes,
-        error.run.from_pressure,
-        tuple(error.theta(z) for z in (best, *_elsewhere(ends))),
-        error.run.by,
+        valve=like.composition.file(theta),
+        parameters={each.name: _fitted(like, end, determined, i) for i, each in enumerate(like.parameters)},
+        rms_m=float(np.sqrt(np.nanmean(np.where(record.valid, error_m, np.nan) ** 2))),
+        floor_m=record.floor_m,
+        cost=end.cost,
+        count=like.count,
+        terms=terms(like, end.groups),
+        moves=len(problem.told),
+        agreement=agreement,
+        condition=determined.condition,
+        undetermined=determined.undetermined,
+        notes=record.notes,
+        from_pressure=problem.from_pressure,
+        onsets_s=end.onsets_s,
+        load_n=problem.load_n,
+        by=problem.by,
     )
 
 
-def with_profile(found: Fit, error: SimulationError) -> Fit:
-    """Return a fit with the intervals that following its cost gives; `error` is that of the run that was fitted."""
-    z = error.coordinates(Composition.from_file(found.valve).theta)
-    determined = uncertainty(error, z)
-    parameters = {each.name: _fitted(error, z, determined, i) for i, each in enumerate(error.parameters)}
-    return replace(found, parameters=parameters, condition=determined.condition, undetermined=determined.undetermined)
+def terms(like: Likelihood, groups: Groups) -> Terms:
+    """Return what the residuals say, kind by kind.
+
+    Samples in motion, and blocks at rest, that hang together count for fewer; landings and break-aways are as many as
+    they are.
+    """
+    scale = like.weights.soft
+    return Terms(
+        _term(groups.motion, scale, independent_share(groups.motion)),
+        _term(groups.landings, scale, 1.0),
+        _term(groups.rests, scale, independent_share(groups.rests)),
+        _term(groups.break_aways, scale, 1.0),
+    )
 
 
-def _elsewhere(ends: Sequence[Vector]) -> list[Vector]:
-    """Return the best search that came to another place than the best of all, if there is one."""
-    away = [z for z in ends if np.max(np.abs(z - ends[0])) > ELSEWHERE]
-    return away[:1]
+def _term(r: Vector, scale: float, share: float) -> Term:
+    return Term(share * r.size, max(1.0, 2.0 * float(soft(r, scale).mean())) if r.size else 1.0)
 
 
-def _centred(error: SimulationError, z: Vector) -> Vector:
-    """Put static friction in the middle of the interval that gives the same slips."""
-    at = [i for i, each in enumerate(error.parameters) if each.index == STATIC]
-    if not at:
-        return z
-    limit = error.cost(z) + FLAT
-    ends = []
-    for way in (-1.0, 1.0):
-        reach = 1e-5
-        while reach < 0.2 and error.cost(_moved(error, z, at[0], 2.0 * way * reach)) < limit:
-            reach *= 2.0
-        ends.append(way * reach)
-    middle = _moved(error, z, at[0], 0.5 * sum(ends))
-    return middle if error.cost(middle) < limit else z
-
-
-def _moved(error: SimulationError, z: Vector, i: int, way: float) -> Vector:
-    there = z.copy()
-    there[i] = np.clip(z[i] + way, error.lower[i], error.upper[i])
-    return there
-
-
-def _fitted(error: SimulationError, z: Vector, determined: Uncertainty, i: int) -> Fitted:
-    parameter = error.parameters[i]
+def _fitted(like: Likelihood, end: End, determined: Uncertainty, i: int) -> Fitted:
+    parameter, z = like.parameters[i], end.z
 
     def value(coordinate: float) -> float:
         there = z.copy()
         there[i] = coordinate
-        return float(error.theta(there)[parameter.index])
+        return float(like.theta(there)[parameter.index])
 
-    low, high = error.lower[i], error.upper[i]
+    low, high = parameter.bounds
     near = AT_BOUND * (high - low)
-    at_bound = bool(z[i] < low + near or z[i] > high - near)
-    inward = 10.0 * near if z[i] < low + near else -10.0 * near
-    wants_out = at_bound and _wants_out(error, z, determined, i, inward)
-    slope = (value(z[i] + 1e-6) - value(z[i] - 1e-6)) / 2e-6
+    at_low, at_high = bool(z[i] < low + near), bool(z[i] > high - near)
+    r, weight = end.groups.whole, 1.0 / np.sqrt(1.0 + (end.groups.whole / like.weights.soft) ** 2)
+    column = end.jacobian[:, i]
+    slope, curvature = float(column @ (weight * r)), float(column**2 @ weight)
+    outward = slope if at_low else -slope if at_high else 0.0
+    wants_out = outward > WANTS_OUT * np.sqrt(max(curvature, 1e-300)) * np.sqrt(max(1.0, 2.0 * end.cost / like.count))
+    by_z = (value(z[i] + 1e-6) - value(z[i] - 1e-6)) / 2e-6
+    lower = value(max(low, float(determined.lower[i]))) if np.isfinite(determined.lower[i]) else -np.inf
+    upper = value(min(high, float(determined.upper[i]))) if np.isfinite(determined.upper[i]) else np.inf
     return Fitted(
-        value(z[i]),
-        abs(slope) * float(determined.std[i]),
-        value(max(low, float(determined.lower[i]))),
-        value(min(high, float(determined.upper[i]))),
-        at_bound,
-        not wants_out,
+        value(z[i]), abs(by_z) * float(determined.std[i]), lower, upper, at_low or at_high, not bool(wants_out)
     )
-
-
-def _wants_out(error: SimulationError, z: Vector, determined: Uncertainty, i: int, inward: float) -> bool:
-    """Whether the cost rises so steeply into the range that its least must lie beyond the end."""
-    steepness = (error.cost(_moved(error, z, i, inward)) - error.cost(z)) / abs(inward)
-    return steepness > 0.0 and steepness * float(determined.std[i]) > WANTS_OUT * determined.rise
-
-
-def _search(error: SimulationError, z: Vector) -> Search:
-    theta = error.theta(z)
-    return Search(error.cost(z), error.rms_m(z), {each.name: float(theta[each.index]) for each in error.parameters})

@@ -5,8 +5,8 @@ S(q) = sum w_j cos(2 pi x_j / q)      x_j median position of the j-th rest, wher
 
 Where rests are few, samples spread over the record stand in for them: these show a quantum of four noises and more.
 
-A move that is first seen d samples after a change of the command came after d - 1 to d of them. Seen so seldom, the
-error is a stair over the delay, on any step of which a search ends: it begins amid the likely ones.
+A move that is first seen d samples after a change of the command came after d - 1 to d of them. Told when the stem
+moves, a model is indifferent to its delay but within a sample of the right one: a search begins amid the likely ones.
 """
 
 from collections.abc import Sequence
@@ -17,10 +17,8 @@ import numpy as np
 from scipy.optimize import minimize_scalar
 
 from config.recording import Column
-from sim.karnopp import Vector
 from workbench.data.motion import directions
 from workbench.data.record import Record
-from workbench.fit.objective import SimulationError
 from workbench.model.parameters import Parameter
 
 ENDS, INSIDE, ASIDE = (0.002, 0.998), (1.0, 4.0, 16.0), 0.1
@@ -29,8 +27,6 @@ LEAST_REST, FEWEST_RESTS = 8, 6
 MOST_SAMPLES = 500
 """Samples that stand in for rests."""
 LIKELY_QUANTA = 8
-THE_SAME = 1e-3
-"""Rise of the cost that is none."""
 FINEST, COARSEST = 2.0, 8.0
 """A quantum is sought from so many noises to the swept positions divided by so many;"""
 FINEST_OF_RESTS = 0.8
@@ -44,11 +40,11 @@ OF_DELAYS = (0.5, 0.25, 0.75)
 """Quantiles of the delays from which searches begin."""
 
 
-def guessed_values(added: Sequence[Parameter], record: Record, *, slow: bool = False) -> list[tuple[float, ...]]:
+def guessed_values(added: Sequence[Parameter], record: Record) -> list[tuple[float, ...]]:
     """Return values of the parameters that the positions suggest, for an effect that declares what of them it may be.
 
-    Just inside their lowest or highest, or both; the quanta to which they look rounded; where samples lie farther apart
-    than slides last, slow, the delays after which the stem moves. Empty if none is declared.
+    Just inside their lowest or highest, or both; the quanta to which they look rounded; the delays after which the stem
+    moves. Empty if none is declared.
     """
     suggested: list[dict[str, float]] = []
     ends = _ends(added, record)
@@ -59,7 +55,7 @@ def guessed_values(added: Sequence[Parameter], record: Record, *, slow: bool = F
             suggested += [{"lowest": lower, "swept": upper - lower} for lower, upper in stops]
     if any(each.guess == "quantum" for each in added):
         suggested += [{"quantum": each} for each in likely_quanta_m(record)]
-    if slow and any(each.guess == "delay" for each in added):
+    if any(each.guess == "delay" for each in added):
         suggested += [{"delay": each} for each in likely_delays_s(record)]
     return [
         tuple(guess.get(each.guess, each.starts[0] if each.starts else each.least) for each in added)
@@ -85,39 +81,6 @@ def _ends(added: Sequence[Parameter], record: Record) -> _Ends | None:
     aside_m = ASIDE * (highest_m - lowest_m)
     below_m = min(declared["lowest"], lowest_m - aside_m)
     return _Ends(lowest_m, highest_m, below_m, max(declared["lowest"] + declared["swept"], highest_m + aside_m))
-
-
-def with_open_ends(error: SimulationError, z: Vector, added: Sequence[Parameter]) -> Vector:
-    """Return z with a stop that the stem nowhere comes to where it is declared: the record says no more of it.
-
-    Args:
-        error: by whose cost that is judged: it is the same.
-        z: coordinates of a fit.
-        added: the parameters of the effects that it has beside the base.
-    """
-    ends = _ends(added, error.run.record)
-    if ends is None:
-        return z
-    lower, travel = ({each.guess: each for each in added}[guess].index for guess in ("lowest", "swept"))
-    for below, above in ((True, False), (False, True)):
-        theta = error.theta(z)
-        lower_m = ends.below_m if below else float(theta[lower])
-        upper_m = ends.above_m if above else float(theta[lower] + theta[travel])
-        theta[lower], theta[travel] = lower_m, upper_m - lower_m
-        there = error.coordinates(theta)
-        if error.cost(there) - error.cost(z) < THE_SAME:
-            z = there
-    return z
-
-
-def with_other_end_kept(error: SimulationError, z: Vector, there: Vector, i: int) -> Vector:
-    """Return where the i-th coordinate was moved to from z; of a lower stop so that the upper one stays where it is."""
-    moved, travel = error.parameters[i], next((each for each in error.parameters if each.guess == "swept"), None)
-    if moved.guess != "lowest" or travel is None:
-        return there
-    before, theta = error.theta(z), error.theta(there)
-    theta[travel.index] += before[moved.index] - theta[moved.index]
-    return error.coordinates(theta)
 
 
 def likely_delays_s(record: Record) -> list[float]:

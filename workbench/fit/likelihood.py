@@ -11,7 +11,7 @@ First factor. A simulation is told the moves (`workbench.model.told_run`). With 
 sigma the noise, tau = `landing` sigma. Second factor. F_s lies between L_bears, what a rest bore, and L_breaks, what
 broke it loose:
 
-    r_k = max(L_bears - F_s, F_s - L_breaks, 0) / (`break_away` F_c)
+    r_k = max(L_bears - F_s, F_s - L_breaks, 0) / L_0     L_0 = `break_away` of the sliding friction on the data sheet
 
 The cost is the soft L1 of all, s^2 (sqrt(1 + (r / s)^2) - 1) summed, s = `soft`. It is smooth in every parameter:
 nothing in it asks whether a slip happened.
@@ -27,6 +27,7 @@ import numpy.typing as npt
 from sim.composition import COULOMB, STATIC, Composition
 from sim.karnopp import Vector
 from workbench.data.record import Record
+from workbench.model.parameters import Parameter
 from workbench.model.sampling import Sampling
 from workbench.model.told_run import ToldMove, ToldPath, ToldRun
 
@@ -42,11 +43,11 @@ class Weights:
     landing: float = 0.1
     """tau, in sigma: no simulation is believed more closely, however long a rest is averaged."""
     break_away: float = 0.01
-    """Of F_c, to which a break-away tells static friction: an onset is known to a part of a sample."""
+    """Of F_c on the data sheet, to which a break-away tells F_s: an onset is known to a part of a sample."""
     soft: float = 5.0
     """Residuals beyond which one counts by its amount alone: a wild sample is no evidence."""
-    before: int = 3
-    """Samples before a move that count one by one: so early its onset may be, and each of them speaks against it."""
+    beside: int = 3
+    """Samples before and after a move that count one by one: each speaks against one that is early or late."""
     wild: float = 1e4
     """Residual of a sample where the model has no answer."""
 
@@ -97,8 +98,9 @@ def layout(record: Record, told: Sequence[ToldMove], weights: Weights = WEIGHTS)
         rests += 1
         for k, move in enumerate(told):
             if move.segment == number:
-                state[first_in_motion(move, weights) : move.after] = -1
-                state[move.after : end] = after[k] = rests
+                landed = last_in_motion(move, weights) + 1
+                state[first_in_motion(move, weights) : landed] = -1
+                state[landed:end] = after[k] = rests
                 rests += 1
     state[~record.valid] = -2
     resting = np.flatnonzero(state >= 0)
@@ -121,11 +123,16 @@ def layout(record: Record, told: Sequence[ToldMove], weights: Weights = WEIGHTS)
 
 def first_in_motion(move: ToldMove, weights: Weights = WEIGHTS) -> int:
     """Return the first row of a move that counts by itself."""
-    return max(move.before + 1 - weights.before, move.rested_from + 1)
+    return max(move.before + 1 - weights.beside, move.rested_from + 1)
+
+
+def last_in_motion(move: ToldMove, weights: Weights = WEIGHTS) -> int:
+    """Return the last row of a move that counts by itself."""
+    return min(move.after + weights.beside, move.until) - 1
 
 
 class Likelihood:
-    """The residuals of a composition that is told through a record, of a parameter vector and onsets, s.
+    """The residuals of a composition told through a record; its parameters by their coordinates z, onsets in s.
 
     Raises:
         InputError: as `workbench.model.free_run.FreeRun`.
@@ -136,12 +143,15 @@ class Likelihood:
         composition: Composition,
         record: Record,
         told: Sequence[ToldMove],
+        parameters: Sequence[Parameter],
         *,
         by: Sampling,
         from_pressure: bool = False,
+        load_n: float,
         weights: Weights = WEIGHTS,
     ) -> None:
-        self.composition, self.record, self.weights = composition, record, weights
+        self.composition, self.record, self.parameters, self.weights = composition, record, tuple(parameters), weights
+        self.by, self.load_n = by, load_n
         self.run = ToldRun(composition, record, tuple(told), by=by, from_pressure=from_pressure)
         self.layout = layout(record, told, weights)
         self.sigma_m = record.scale_m
@@ -152,6 +162,23 @@ class Likelihood:
     def moves(self) -> tuple[ToldMove, ...]:
         """What the stem is told."""
         return self.run.moves
+
+    @property
+    def count(self) -> int:
+        """Residuals."""
+        sizes = self.layout.moving.size, self.layout.per_rest.size, self.layout.starts.size, self.broken.size
+        return int(sum(sizes))
+
+    def theta(self, z: Vector) -> Vector:
+        """Return the parameter vector of coordinates, (parameters,)."""
+        theta = self.composition.theta.copy()
+        for each, value in zip(self.parameters, z, strict=True):
+            each.put(theta, float(value))
+        return theta
+
+    def coordinates(self, theta: Vector) -> Vector:
+        """Return the coordinates of a parameter vector."""
+        return np.array([each.coordinate(theta) for each in self.parameters])
 
     def at(self, theta: Vector, onsets_s: Vector) -> Groups:
         """Simulate; return the residuals."""
@@ -173,8 +200,17 @@ class Likelihood:
     def break_rows(self, path: ToldPath, theta: Vector) -> Vector:
         """Return the residuals of the second factor."""
         F_s, bears, breaks = float(theta[STATIC]), path.bears_n[self.broken], path.breaks_n[self.broken]
-        off = np.maximum(np.maximum(bears - F_s, F_s - breaks), 0.0) / (self.weights.break_away * float(theta[COULOMB]))
+        breaks = np.where(breaks > 0.0, breaks, np.inf)  # it slides on where the record rests: nothing breaks loose
+        off = np.maximum(np.maximum(bears - F_s, F_s - breaks), 0.0) / self.load_n
         return np.clip(np.nan_to_num(off, nan=self.weights.wild), 0.0, self.weights.wild)
+
+
+def with_static(like: Likelihood, theta: Vector, path: ToldPath) -> Vector:
+    """Return a parameter vector with the static friction that its path's break-aways like best, (parameters,)."""
+    ends_n = np.concatenate([path.bears_n[like.broken], path.breaks_n[like.broken]])
+    ends_n = np.unique(ends_n[np.isfinite(ends_n) & (ends_n > theta[COULOMB])])
+    trials = [theta] + [np.where(np.arange(theta.size) == STATIC, each, theta) for each in ends_n]
+    return min(trials, key=lambda there: float(soft(like.break_rows(path, there), like.weights.soft).sum()))
 
 
 def soft(r: Vector, scale: float = WEIGHTS.soft) -> Vector:

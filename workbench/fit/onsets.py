@@ -10,7 +10,7 @@ import numpy as np
 
 from sim.karnopp import Vector
 from workbench.fit.breaking_off import go_on
-from workbench.fit.likelihood import Groups, Likelihood, first_in_motion, soft
+from workbench.fit.likelihood import Groups, Likelihood, first_in_motion, last_in_motion, soft
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -36,7 +36,7 @@ class OnsetSearch:
 SEARCH = OnsetSearch()
 
 
-def with_onsets(like: Likelihood, theta: Vector) -> tuple[Vector, Groups]:
+def with_onsets(like: Likelihood, theta: Vector, rounds: int | None = None) -> tuple[Vector, Groups]:
     """Return the onsets, s, (moves,), that suit a valve best, (parameters,), and the residuals with them.
 
     Each onset acts until the next: all are found at once, each by its own parabola, and kept where they help.
@@ -49,7 +49,7 @@ def with_onsets(like: Likelihood, theta: Vector) -> tuple[Vector, Groups]:
     onsets_s = np.choose(np.argmax(near, axis=0), tried) if len(like.moves) else np.empty(0)
     groups = like.at(theta, onsets_s)
     reach = np.full(onsets_s.size, SEARCH.first_step)
-    for _ in range(SEARCH.rounds if onsets_s.size else 0):
+    for _ in range((rounds or SEARCH.rounds) if onsets_s.size else 0):
         go_on()
         slopes = by_onsets(like, theta, onsets_s)
         r = groups.whole
@@ -79,7 +79,7 @@ def motion_rows(like: Likelihood) -> list[tuple[int, int]]:
     """Return which of the residuals in motion belong to each move, first to end (half open)."""
     moving = like.layout.moving
     return [
-        (int(np.searchsorted(moving, first_in_motion(each))), int(np.searchsorted(moving, each.after)))
+        (int(np.searchsorted(moving, first_in_motion(each))), int(np.searchsorted(moving, last_in_motion(each) + 1)))
         for each in like.moves
     ]
 

@@ -1,8 +1,8 @@
 """One recording held against one model, as far as it takes: looked at, refitted, diagnosed.
 
     look      the model in free run against the measured position (`workbench.compare`): explained, and no more is done
-    refit     spring and friction fitted anew, by one search, by all if that is not at the floor; if the valve then
-              explains the recording, it has changed, or is as before where its parameters are
+    refit     spring and friction fitted anew; if the valve then explains the recording, it has changed, or is as before
+              where its parameters are
     diagnose  all else: which effect is missing
 
 Explained is what `compare` calls adequate, and closer, as what a refit bends itself round would be missed:
@@ -14,9 +14,8 @@ The rules of "missing" are those of `diagnose`. The same recording and model giv
 whatever machine it runs.
 """
 
-from collections.abc import Iterator, Mapping, Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
-from functools import partial
 from math import isfinite
 from pathlib import Path
 from typing import Any
@@ -32,9 +31,9 @@ from workbench.compare.comparison import NUMERICAL, Comparison, compare
 from workbench.diagnosis.diagnosis import Diagnosis, diagnose
 from workbench.fit.fit_result import Fit
 from workbench.fit.fitted_parameter import Fitted
-from workbench.fit.fitting import fit, local_fit, profiled
+from workbench.fit.fitting import fit
 
-RULES = 4
+RULES = 5
 """To be raised when an examination would come out differently: what was kept is then made anew."""
 UNREADABLE, AS_BEFORE, CHANGED, UNTOLD = "unreadable", "as_before", "changed", "untold"
 LEAST_CHANGE = 0.05
@@ -119,7 +118,7 @@ class Examination(Schema):
     rivals: tuple[str, ...] = ()
     """What explains as much as these."""
     evidence: float | None = None
-    standard_errors: float | None = None
+    held_out_evidence: float | None = None
     changes: tuple[Change, ...] = ()
     candidates: tuple[Tried, ...] = ()
     model: str | None = None
@@ -161,9 +160,9 @@ def _examined(request: Request) -> Examination:
 
 
 def _explained(recording: Recording, request: Request, figures: Mapping[str, Any]) -> Examination:
-    refitted = refit(recording, request.model, request.floor_m)
-    if refitted is not None:
-        return _refitted(recording, *refitted, request, figures)
+    explained = refit(recording, request.model, request.floor_m)
+    if explained is not None:
+        return _refitted(*explained, request, figures)
     return _diagnosed(diagnose(recording, request.model, workers=1), request, figures)
 
 
@@ -178,18 +177,18 @@ def refit(recording: Recording, model: ValveFile, known_floor_m: float | None = 
     Raises:
         InputError: the recording holds too little.
     """
-    return next((each for each in refits(recording, model) if is_at_floor(each[1], model, known_floor_m)), None)
+    found, again = refitted(recording, model)
+    return (found, again) if is_at_floor(again, model, known_floor_m) else None
 
 
-def refits(recording: Recording, model: ValveFile) -> Iterator[tuple[Fit, Comparison]]:
-    """Yield the valve refitted, and how it compares: by one search, then by all.
+def refitted(recording: Recording, model: ValveFile) -> tuple[Fit, Comparison]:
+    """Return the valve refitted, and how it compares, whatever it leaves.
 
     Raises:
         InputError: the recording holds too little.
     """
-    for fitted in (local_fit, partial(fit, workers=1)):
-        found = fitted(recording, model)
-        yield found, compare(recording, found.valve)
+    found = fit(recording, model, workers=1)
+    return found, compare(recording, found.valve)
 
 
 def is_at_floor(comparison: Comparison, model: ValveFile, known_floor_m: float | None = None) -> bool:
@@ -252,12 +251,10 @@ def _friction(file: ValveFile) -> dict[str, Any]:
     return {"dead_band_share": 2.0 * valve.coulomb_n * per_n, "jump_share": (valve.static_n - valve.coulomb_n) * per_n}
 
 
-def _refitted(
-    recording: Recording, found: Fit, again: Comparison, request: Request, figures: Mapping[str, Any]
-) -> Examination:
+def _refitted(found: Fit, again: Comparison, request: Request, figures: Mapping[str, Any]) -> Examination:
     changes = changes_of(request.model, found.parameters)
-    if changes and not request.is_first:
-        changes = _beyond_what_was_known(changes_of(request.model, profiled(found, recording).parameters), request)
+    if not request.is_first:
+        changes = _beyond_what_was_known(changes, request)
     return Examination(
         **_outcome_of_refit(changes, request),
         error_after_m=again.rms_m,
@@ -301,7 +298,7 @@ def _beyond_what_was_known(changes: Sequence[Change], request: Request) -> tuple
         return tuple(changes)
     try:
         recording = Recording.read(Path(request.known_by))
-        known = profiled(local_fit(recording, request.model), recording).parameters
+        known = fit(recording, request.model, workers=1).parameters
     except InputError:  # it is gone by now, or too short for a fit: the model stands as it is
         return tuple(changes)
     return tuple(
@@ -337,7 +334,7 @@ def _diagnosed(diagnosis: Diagnosis, request: Request, figures: Mapping[str, Any
         effects=diagnosis.missing,
         rivals=tuple(name for names in diagnosis.indistinguishable for name in names if name not in diagnosis.missing),
         evidence=_known(gain.bic) if gain else None,
-        standard_errors=_known(gain.standard_errors) if gain else None,
+        held_out_evidence=_known(gain.held_out_evidence) if gain else None,
         changes=changes,
         candidates=tuple(
             Tried(name=each.name, held_out_m=each.test, remark=each.rejection_reason)

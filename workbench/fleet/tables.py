@@ -51,8 +51,8 @@ FIGURES = (
     Column("floor_m", "number", "what no model undercuts, rms, m"),
     Column("dead_band_share", "number", "2 F_c / k_s of that model, of the stroke"),
     Column("jump_share", "number", "(F_s - F_c) / k_s of that model, of the stroke"),
-    Column("evidence", "number", "gain of the effect added first, robust BIC; above 10 it counts"),
-    Column("standard_errors", "number", "by which the held-out error fell with it"),
+    Column("evidence", "number", "for the effect added first, of what was fitted (BIC); above 10 it counts"),
+    Column("held_out_evidence", "number", "the same, of what was held out; above 6 it counts"),
 )
 """Of an examination, as they stand there."""
 CHANGES = Column("changes", "text", "JSON: parameter to [then, now, lower and upper end of the 95 % interval of now]")
@@ -73,7 +73,7 @@ TABLES: Mapping[str, tuple[str, tuple[Column, ...]]] = {
             Column(
                 "cost_share", "number", "how far the stem is from where the last good model has it, rms, of the stroke"
             ),
-            *(each for each in FIGURES if each.name in ("dead_band_share", "evidence", "standard_errors")),
+            *(each for each in FIGURES if each.name in ("dead_band_share", "evidence", "held_out_evidence")),
             Column("drifting", "text", "parameters that changed more than once, always one way"),
             SENTENCE,
             Column("recordings", "count", "of the valve"),
@@ -103,7 +103,7 @@ TABLES: Mapping[str, tuple[str, tuple[Column, ...]]] = {
             Column("why", "text", "in words"),
             EFFECTS,
             CHANGES,
-            *(each for each in FIGURES if each.name.startswith(("error", "floor", "evidence", "standard"))),
+            *(each for each in FIGURES if each.name.startswith(("error", "floor", "evidence", "held_out"))),
             Column("text", "text", "the valve file"),
         ),
     ),

@@ -169,9 +169,9 @@ def _after_first(candidate: ForceCandidate, first: ForceCandidate | None) -> For
 
 
 def _candidate(number: int, name: str, before: ForceFit, fit: ForceFit) -> ForceCandidate:
-    held_out, standard_errors = relative_error_reduction(before.logs, fit.logs)
-    gain = Gain(before.bic - fit.bic, held_out, standard_errors, independent_share=1.0)
-    return ForceCandidate(number, name, fit.range_violation or gain.rejection_reason(at_floor=False), fit, gain)
+    held_out, _ = relative_error_reduction(before.logs, fit.logs)
+    gain = Gain(before.bic - fit.bic, held_out, 2.0 * sum(before.logs - fit.logs))
+    return ForceCandidate(number, name, fit.range_violation or gain.rejection_reason, fit, gain)
 
 
 def _verdict(

@@ -40,7 +40,7 @@ def _candidate(each: ForceCandidate) -> dict[str, Any]:
         **_fit(each.fit),
         "evidence": each.gain.bic,
         "held_out_gain": each.gain.held_out,
-        "held_out_standard_errors": each.gain.standard_errors,
+        "held_out_evidence": each.gain.held_out_evidence,
         "physical": not each.fit.range_violation,
         "accepted": each.accepted,
         "why_not": each.rejection_reason,

@@ -7,8 +7,6 @@ Its files:
     slow_segments             a record as it is simulated without inertia
     initial_state             where a segment begins, and the pressure that nobody told
     lead                      what was commanded before a segment, for a pressure path that remembers
-    multiple_shooting         the same, put back to the measured stem before each slip
-    thinning                  fewer rows, for a search that is far from its end
     sampling                  with inertia, without, or landing by landing: by how far apart the samples are
     command_between_samples   whether the command changed between them, by where slides end
     pressure_between_samples  what the measured pressure is between them

@@ -73,8 +73,6 @@ FINE = Accuracy(1.0, 3e-4)
 """Within 1 um rms, where effects remember, of steps a hundredth as long: a fiftieth of a transmitter's noise."""
 ROUGH = Accuracy(2.0, 1e-3)
 """Within 50 um. A wider tolerance hides from the finite differences what a little viscous friction does."""
-SCOUTING = Accuracy(10.0, 1e-3)
-"""Behind a positioner, where a quarter of the step moves a stem that hunts by as much as ten of them do."""
 PART_S, MOST_PARTS = 2e-3, 8
 """Parts of a sample over which a measured pressure is held: about as long, at most so many."""
 BEYOND_PA = 1e12

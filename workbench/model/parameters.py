@@ -22,6 +22,9 @@ DEFAULT = ("spring_n_per_m", "viscous_ns_per_m", "coulomb_n", "static_n")
 """What is free of the base model by default. A is fixed: pressure and position give only ratios of forces."""
 AT_REST, LANDED = ("spring_n_per_m", "coulomb_n", "static_n"), ("spring_n_per_m", "coulomb_n")
 """The same where the stem has no inertia, and where only its landings are judged."""
+BEHIND_POSITIONER = ("coulomb_n", "static_n")
+"""The same behind a positioner, of which no pressure is known: pressures are known up to a factor, so that the spring
+stays as the valve file has it, and viscous friction with it, which the positioner's ramps hide."""
 FACTOR = 50.0
 """A base parameter is sought within this factor of the valve file's, and of where it was fitted without an effect."""
 MOST_STATIC = 5.0

@@ -11,6 +11,7 @@ from dataclasses import dataclass, replace
 from functools import lru_cache
 
 import numpy as np
+import numpy.typing as npt
 
 from config.recording import Column
 from config.results.result import Brief
@@ -22,7 +23,7 @@ from workbench.data.record import Record
 from workbench.model.free_run import FreeRun, Segment
 from workbench.model.sampling import DYNAMIC, Sampling
 
-BEARS, BREAKS = 0, 1
+Rows = npt.NDArray[np.int64]
 RECORDS = 64
 """Whose moves are kept: each is asked for again by every model that is held against it."""
 
@@ -95,12 +96,11 @@ class ToldRun:
         self.free = FreeRun(composition, seen, from_pressure=from_pressure, by=DYNAMIC)
         self._composition = self.free._composition
         self._tell = self._composition.told.tell
-        self._segments = [
-            (each, [k for k, move in enumerate(told) if move.segment == number])
+        self._parts = [
+            _part(each, [k for k, move in enumerate(told) if move.segment == number], told, record)
             for number, each in enumerate(self.free._segments)
         ]
-
-        self._fed = {each.first: self._fed_m(each) for each, _ in self._segments}
+        self._fed = {each.segment.first: self._fed_m(each.segment) for each in self._parts}
 
     def _fed_m(self, segment: Segment) -> Vector:
         """Return what a positioner is fed: the measured stem, m, (periods + 1,); NaN where none obeys it."""
@@ -131,9 +131,10 @@ class ToldRun:
         vector = np.array(theta[self.free._kept])
         indicated_m = np.full(len(self.record), np.nan)
         bears, breaks = np.zeros(len(self.moves)), np.zeros(len(self.moves))
-        for segment, numbers in self._segments:
+        for part in self._parts:
+            segment = part.segment
             drive_pa, state = self.free._started(vector, segment)
-            held = self._held(segment, numbers, onsets_s)
+            held = self._held(part, onsets_s)
             seen_m = self._fed[segment.first]
             path, loads = np.empty((PATH_ROWS, segment.periods_s.size + 1)), np.empty((2, segment.periods_s.size))
             self._tell(
@@ -141,36 +142,64 @@ class ToldRun:
                 *(segment.step_s, self.free._tolerance, self.record.scale_m, path, loads),
             )
             indicated_m[segment.first : segment.end] = path[INDICATED, :: segment.parts]
-            self._note_loads(segment, numbers, held, loads, bears, breaks)
+            if part.rested.size:
+                # What is held bears, what is let go breaks loose: between two rests' begins either is one move's.
+                loads[0, held < 1.0] = 0.0
+                bears[part.first : part.end], breaks[part.first : part.end] = np.maximum.reduceat(
+                    loads, part.rested, axis=1
+                )
         return ToldPath(indicated_m, bears, breaks)
 
-    def _held(self, segment: Segment, numbers: list[int], onsets_s: Vector) -> Vector:
+    def _held(self, part: "_Part", onsets_s: Vector) -> Vector:
         """Return the share of each period for which the stem is held."""
-        starts_s = self.record.time_s[segment.first] + np.concatenate([[0.0], np.cumsum(segment.periods_s)])
-        held = np.ones(segment.periods_s.size)
-        for k in numbers:
-            move = self.moves[k]
-            over = (move.after - segment.first) * segment.parts
-            if move.begins_in_motion:
-                held[:over] = 0.0
-                continue
-            at = int(np.searchsorted(starts_s, onsets_s[k], side="right")) - 1
-            at = min(max(at, 0), held.size - 1)
-            held[at + 1 : over] = 0.0
-            held[at] = min(max((onsets_s[k] - starts_s[at]) / segment.periods_s[at], 0.0), 1.0)
-            if held[at] == 1.0 and at + 1 < held.size:
-                held[at + 1] = 0.0
+        count = part.starts_s.size - 1
+        begins = part.begins.copy()
+        let_go = part.let_go
+        onset_s = onsets_s[part.first : part.end][let_go]
+        at = np.clip(np.searchsorted(part.starts_s, onset_s, side="right") - 1, 0, count - 1)
+        begins[let_go] = np.minimum(at + 1, count)
+        change = np.zeros(count + 1)
+        np.add.at(change, begins, -1.0)
+        np.add.at(change, np.maximum(part.overs, begins), 1.0)
+        held = np.where(np.cumsum(change[:-1]) < 0.0, 0.0, 1.0)
+        held[at] = np.clip((onset_s - part.starts_s[at]) / np.diff(part.starts_s)[at], 0.0, 1.0)
         return held
 
-    def _note_loads(
-        self, segment: Segment, numbers: list[int], held: Vector, loads: Vector, bears: Vector, breaks: Vector
-    ) -> None:
-        for k in numbers:
-            move = self.moves[k]
-            rested = (move.rested_from - segment.first) * segment.parts
-            loose = rested + int(np.argmax(held[rested:] < 1.0)) if (held[rested:] < 1.0).any() else held.size - 1
-            bears[k] = float(np.max(loads[BEARS, rested:loose], initial=0.0))
-            leaves = loose
-            while leaves + 1 < held.size and loads[BREAKS, leaves + 1] > 0.0:
-                leaves += 1  # let go before the load was there: it leaves with what breaks it loose
-            breaks[k] = float(np.max(loads[:, loose : leaves + 1]))
+
+@dataclass(frozen=True, slots=True)
+class _Part:
+    """The moves of one segment: which they are, first to end (half open), and where its periods begin."""
+
+    segment: Segment
+    first: int
+    end: int
+    starts_s: Vector
+    """(periods + 1,)."""
+    begins: Rows
+    """First period loose throughout, of what begins in motion, (moves,)."""
+    overs: Rows
+    """First period held again, (moves,)."""
+    rested: Rows
+    """First period of the rest before, (moves,)."""
+    let_go: Rows
+    """Which of them begin at rest."""
+
+
+def _part(segment: Segment, numbers: list[int], told: tuple[ToldMove, ...], record: Record) -> _Part:
+    of = [told[k] for k in numbers]
+    first = numbers[0] if numbers else 0
+    starts_s = record.time_s[segment.first] + np.concatenate([[0.0], np.cumsum(segment.periods_s)])
+
+    def periods(rows: list[int]) -> Rows:
+        return segment.parts * (np.array(rows, dtype=np.int64) - segment.first)
+
+    return _Part(
+        segment=segment,
+        first=first,
+        end=first + len(of),
+        starts_s=starts_s,
+        begins=np.zeros(len(of), dtype=np.int64),
+        overs=periods([each.after for each in of]),
+        rested=periods([each.rested_from for each in of]),
+        let_go=np.flatnonzero([not each.begins_in_motion for each in of]),
+    )

@@ -40,7 +40,7 @@ from workbench.report.plot_series import drawn, rounded
 from workbench.report.ranking import RankedEffect
 from workbench.report.signature_loop import signature
 from workbench.report.units import Reading, Shown, of_stroke, times
-from workbench.select.effect_acceptance import LEAST_BIC
+from workbench.select.effect_acceptance import LEAST_BIC, LEAST_HELD_OUT
 from workbench.select.effect_candidates import EffectCandidate, EffectStep, EvaluatedModel
 from workbench.select.equivalence import undetectable
 from workbench.select.experiment import Experiment
@@ -51,7 +51,8 @@ DIAGNOSIS_WORDS = {
     "Fitted, held out": "The model's parameters are fitted to one part of the data. The other part is held out: "
     "the model has not seen it, so that an error which falls there is no trick of the fit.",
     "Evidence": "How much better an effect explains the fitted part than the model without it, less a price for "
-    f"each parameter it brings (gain of the robust Bayesian information criterion). Above {LEAST_BIC:g} it counts.",
+    f"each parameter it brings (gain of the Bayesian information criterion). Above {LEAST_BIC:g} it counts. Held out, "
+    f"where nothing was fitted, no price is taken: above {LEAST_HELD_OUT:g} it counts.",
     "95 % interval": "Where the parameter lies, as far as this recording says.",
 }
 
@@ -167,12 +168,12 @@ def _fall(diagnosis: Diagnosis, validation: _Validation) -> Html:
                 read.length(model.errors.test_block_m),
                 "–" if candidate is None or candidate.gain is None else f"{candidate.gain.bic:.4g}",
             ],
-            "" if model.complete else "something is left to explain",
-            "good" if model.complete else "",
+            "" if model.explained else "something is left to explain",
+            "good" if model.explained else "",
         )
         for name, model, candidate in stages
     ]
-    head = ["Model", "Error, fitted, mm", "Held out, mm", "In floors", "Median second, held out, mm", "Evidence"]
+    head = ["Model", "Error, fitted, mm", "Held out, mm", "In floors", "Median move, held out, mm", "Evidence"]
     head = [read.title(each) for each in head]
     return section(
         "fall",
@@ -186,8 +187,8 @@ def _fall(diagnosis: Diagnosis, validation: _Validation) -> Html:
         ),
         table("table-fall", head, rows),
         text(
-            "The median second is the error in a typical second: one narrowly mistimed slip weighs nothing in it, and "
-            "much in the rms."
+            "All errors are of a simulation that is told when the stem moves. The median move is a typical one, with "
+            "the rest that it ends in: one that went wrong weighs nothing in it, and much in the rms."
         ),
     )
 
@@ -247,7 +248,7 @@ def _where(validation: _Validation) -> Html:
 
 def _ranking(diagnosis: Diagnosis, validation: _Validation) -> Html:
     steps = [RankedStep(step.before.effects, step.before.errors.test_rmse_m, ranked(step)) for step in diagnosis.steps]
-    return tried_effects(steps, validation.floor_m, Reading(diagnosis.kind).errors, "second by second")
+    return tried_effects(steps, validation.floor_m, Reading(diagnosis.kind).errors)
 
 
 def ranked(step: EffectStep) -> list[RankedEffect]:
@@ -258,7 +259,7 @@ def ranked(step: EffectStep) -> list[RankedEffect]:
             each.name,
             each.model.errors.test_rmse_m if each.model else None,
             each.model.errors.train_rmse_m if each.model else None,
-            each.gain.standard_errors if each.gain else None,
+            each.gain.held_out_evidence if each.gain else None,
             each.gain.bic if each.gain else None,
             outcome(each.name, added, rivals, refused=not each.accepted),
             each.rejection_reason,

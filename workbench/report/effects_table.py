@@ -8,7 +8,7 @@ from workbench.report import ranking
 from workbench.report.page import Html, Row, plot, preformatted, section, subheading, table, text
 from workbench.report.ranking import RankedEffect
 from workbench.report.units import Quantity
-from workbench.select.effect_acceptance import LEAST_BIC, LEAST_REDUCTION, LEAST_STANDARD_ERRORS
+from workbench.select.effect_acceptance import LEAST_BIC, LEAST_HELD_OUT
 from workbench.select.equivalence import classes, distinguishing_record
 
 VERDICTS = {
@@ -51,14 +51,13 @@ def outcome(name: str, added: str, indistinguishable: Collection[str], *, refuse
     return "refused" if refused else "accepted"
 
 
-def tried_effects(steps: Sequence[RankedStep], floor: float | None, of: Quantity, parts: str) -> Html:
-    """Return the section of all steps; `parts` says of what the error must fall, part by part."""
+def tried_effects(steps: Sequence[RankedStep], floor: float | None, of: Quantity) -> Html:
+    """Return the section of all steps."""
     shown = [
         text(
             "Each effect of the library was added in turn and the whole model refitted with it. "
-            f"An effect is accepted if its evidence exceeds {LEAST_BIC:g}, the held-out error, {parts}, falls by more "
-            f"than {100 * LEAST_REDUCTION:g} % and by more than {LEAST_STANDARD_ERRORS:g} of its own uncertainties, "
-            "and its parameters are physically possible."
+            f"An effect is accepted if its evidence exceeds {LEAST_BIC:g} on what was fitted and {LEAST_HELD_OUT:g} on "
+            "what was held out, and its parameters are physically possible."
         )
     ]
     dashed = "dashed the floor, " if floor is not None else ""
@@ -80,7 +79,7 @@ def tried_effects(steps: Sequence[RankedStep], floor: float | None, of: Quantity
                     "Outcome",
                     f"Held-out error, {of.unit}",
                     f"Fitted, {of.unit}",
-                    "Fall, in its uncertainties",
+                    "Evidence, held out",
                     "Evidence",
                 ],
                 [_ranked(each, of) for each in rows],
@@ -97,7 +96,7 @@ def _ranked(each: RankedEffect, of: Quantity) -> Row:
             each.said,
             of.shown(each.test),
             of.shown(each.train),
-            "–" if each.reduction_standard_errors is None else f"{each.reduction_standard_errors:.3g}",
+            "–" if each.held_out_evidence is None else f"{each.held_out_evidence:.3g}",
             "–" if each.evidence is None else f"{each.evidence:.4g}",
         ],
         _effect(each.name).text.rstrip("."),

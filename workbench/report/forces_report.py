@@ -232,7 +232,7 @@ def _means(over: Column, values: Column) -> Profile:
 
 def _ranking(diagnosis: ForceDiagnosis) -> Html:
     steps = [RankedStep(step.before.effects, step.before.test_rms_n, _tried(step)) for step in diagnosis.steps]
-    return tried_effects(steps, None, FORCE, "stroke by stroke")
+    return tried_effects(steps, None, FORCE)
 
 
 def _tried(step: ForceStep) -> list[RankedEffect]:
@@ -242,7 +242,7 @@ def _tried(step: ForceStep) -> list[RankedEffect]:
             each.name,
             each.fit.test_rms_n,
             each.fit.train_rms_n,
-            each.gain.standard_errors,
+            each.gain.held_out_evidence,
             each.gain.bic,
             outcome(each.name, added, rivals, refused=not each.accepted),
             each.rejection_reason,

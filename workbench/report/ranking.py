@@ -27,7 +27,7 @@ class RankedEffect:
     name: str
     test: float | None
     train: float | None
-    reduction_standard_errors: float | None
+    held_out_evidence: float | None
     """By how many standard errors the held-out error falls."""
     evidence: float | None
     outcome: str

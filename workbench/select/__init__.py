@@ -7,10 +7,8 @@ Its files:
     effect_acceptance, block_errors               the rule by which an effect is accepted; its statistics
     pressure_errors                               how far a fit's pressure is off the measured one
     pressure_scatter                              what the noise of a measured pressure moves a stem by: of the floor
-    told_errors                                   what is held out, told when the stem moves: static friction apart
     equivalence                                   what no recording tells apart
     tangent_preview                               the quick first ranking
     experiment                                    the input that tells rivals apart, off a menu
     residual_structure                            the meter of what is unexplained
-    rest_errors                                   whether slides end where the model says
 """

@@ -61,7 +61,7 @@ def candidate_table(tried: Sequence[Tried], unit: ErrorUnit, title: str) -> Tabl
         )
         for each in tried
     ]
-    return Table((*headings, "std errors", ""), rows, title)
+    return Table((*headings, "held-out evidence", ""), rows, title)
 
 
 def _error(value: float | None, unit: ErrorUnit) -> str:
@@ -69,7 +69,7 @@ def _error(value: float | None, unit: ErrorUnit) -> str:
 
 
 def _gain(found: Gain) -> tuple[str, str, str]:
-    return f"{found.bic:.1f}", f"{found.held_out:.0%}", f"{found.standard_errors:.1f}"
+    return f"{found.bic:.1f}", f"{found.held_out:.0%}", f"{found.held_out_evidence:.1f}"
 
 
 def candidate_columns(tried: Sequence[Tried], unit: ErrorUnit) -> dict[str, list[object]]:
@@ -82,7 +82,7 @@ def candidate_columns(tried: Sequence[Tried], unit: ErrorUnit) -> dict[str, list
         f"test_typical_rmse{unit.ending}": [each.typical for each in tried],
         "evidence": [each.gain and each.gain.bic for each in tried],
         "held_out_gain": [each.gain and each.gain.held_out for each in tried],
-        "held_out_standard_errors": [each.gain and each.gain.standard_errors for each in tried],
+        "held_out_evidence": [each.gain and each.gain.held_out_evidence for each in tried],
         "accepted": [not each.rejection_reason for each in tried],
         "rejection_reason": [each.rejection_reason for each in tried],
     }

@@ -10,14 +10,9 @@ from config.results.result import Brief
 from config.valve_file import ValveParameters
 from sim.effect import Effect, Parameter
 from workbench.fit.fit_result import Fit
-from workbench.select.block_errors import (
-    SAME_STANDARD_ERRORS,
-    BlockErrors,
-    indistinguishable,
-    relative_error_reduction,
-)
+from workbench.select.block_errors import AT_FLOOR, BlockErrors
 from workbench.select.candidate_table import Tried
-from workbench.select.effect_acceptance import LEAST_BIC, LEAST_STANDARD_ERRORS, Gain, bic, gain, no_better
+from workbench.select.effect_acceptance import LEAST_BIC, OVERWHELMING_BIC, Gain, gain, no_better
 from workbench.select.equivalence import algebraic_class, bare_parameter, classes
 from workbench.select.forward_selection import Candidate, ForwardStep
 from workbench.select.pressure_errors import PressureErrors
@@ -25,8 +20,6 @@ from workbench.select.residual_structure import STRUCTURED
 
 AT_END = 0.2
 """Of the weakest start: nearer to the end of its range a parameter is at it."""
-NEARLY_AS_EVIDENT = 0.5
-"""Of the added one's evidence: with less, an effect is not tried in its place where that leads nowhere."""
 SAME_COST = 1.01
 """Factor on the cost within which two members of a class came out as the one they are."""
 
@@ -41,6 +34,8 @@ class EvaluatedModel(Brief):
     """What no model explains, m; None if it is unknown."""
     pressure: PressureErrors | None = None
     """How far its pressure is off, where that was measured."""
+    noise_m: float | None = None
+    """Of the sensor, m; None: nothing but it scatters."""
 
     @property
     def at_floor(self) -> bool:
@@ -48,23 +43,23 @@ class EvaluatedModel(Brief):
         return self.errors.at_floor(self.floor_m)
 
     @property
+    def scatters(self) -> bool:
+        """Whether the valve repeats itself no better than this is off, and worse than the noise."""
+        return self.noise_m is not None and self.at_floor and self.errors.rms_floors(self.noise_m) > AT_FLOOR
+
+    @property
     def structured(self) -> bool:
-        """Whether the residual still hangs on the state, by more than it may of one that is as large as the floor."""
+        """Whether the residual still hangs on the state, by more than it may of one that is as large as the floor.
+
+        Within what a valve scatters it may.
+        """
         of_floor = 1.0 if self.floor_m is None else min(1.0, self.errors.rms_floors(self.floor_m))
-        return self.errors.structure * of_floor**2 > STRUCTURED
+        return not self.scatters and self.errors.structure * of_floor**2 > STRUCTURED
 
     @property
     def explained(self) -> bool:
         """Whether nothing is left in which an effect would be sought."""
         return self.at_floor and not self.structured
-
-    @property
-    def complete(self) -> bool:
-        """Whether it explains all, and slides end where it says: else what explains it stands in for something.
-
-        No effect is sought for that: of the library, what has more parameters would only stand in better.
-        """
-        return self.explained and not (self.errors.rests and self.errors.rests.elsewhere)
 
     @property
     def effects(self) -> tuple[str, ...]:
@@ -113,7 +108,7 @@ def judged_step(
     """
     tried = {name: _candidate(number, name, before, model, library) for name, model in models.items()}
     candidates = tuple(_after_first(each, tried.get(library[each.name].after)) for each in tried.values())
-    equivalent = _bare_equivalent(candidates, before.at_floor, library)
+    equivalent = _bare_equivalent(candidates, library)
     candidates, added = _best(_better_than(equivalent, candidates) if equivalent else candidates, library)
     added = added and _backed_by_pressure(added, candidates, library)
     suspect = None if added or equivalent else _suspect(candidates, library)
@@ -122,56 +117,36 @@ def judged_step(
     return ForwardStep(before, candidates, added, rivals, equivalent, suspected, contradicted)
 
 
-def runners_up(step: EffectStep, library: Mapping[str, Effect]) -> tuple[EffectCandidate, ...]:
-    """Return the accepted effects that might have been added: by what was held out, and by what was fitted.
-
-    The best of the held-out errors, if there it is no worse than the added one; then, in the first step, after which
-    the most is still missing, the one with the most evidence, if that is `NEARLY_AS_EVIDENT`. One of the added one's
-    class is none: no recording tells them apart; nor is one that a measured pressure speaks against.
-    """
-    added = step.added
-    if added is None or added.model is None:
-        return ()
-    no_others = algebraic_class(added.name, library) | {each.name for each in step.contradicted}
-    others = {
-        each.name: each for each in step.candidates if each.accepted and each.model and each.name not in no_others
-    }
-    logs = {name: each.model.errors.logs for name, each in others.items() if each.model}
-    held_out = min(logs, key=lambda name: float(logs[name].mean()), default=None)
-    fitted = max(others, key=lambda name: others[name].evidence, default=None)
-    found = []
-    if held_out is not None and indistinguishable(added.model.errors.logs, logs[held_out]):
-        found.append(held_out)
-    near = added.step == 1 and fitted is not None and others[fitted].evidence > NEARLY_AS_EVIDENT * added.evidence
-    if fitted is not None and near and not algebraic_class(fitted, library) & {*found}:
-        found.append(fitted)
-    return tuple(others[name] for name in found)
-
-
 def with_added(step: EffectStep, candidate: EffectCandidate, library: Mapping[str, Effect]) -> EffectStep:
     """Return a step with another of its candidates added."""
     rivals, contradicted = _rivals(step.candidates, candidate, library)
-    return replace(step, added=candidate, indistinguishable=rivals, contradicted=contradicted)
-
-
-def leads_farther(one: EvaluatedModel, other: EvaluatedModel) -> bool:
-    """Whether one of two models is to be gone on from: it explains all, or does better on what was held out.
-
-    Where that does not tell them apart the evidence on the fitted part does.
-    """
-    if one.explained != other.explained:
-        return one.explained
-    _, standard_errors = relative_error_reduction(other.errors.logs, one.errors.logs)
-    if abs(standard_errors) > SAME_STANDARD_ERRORS:
-        return standard_errors > 0.0
-    return bic(other.fit) - bic(one.fit) > LEAST_BIC
+    added = replace(candidate, rejection_reason="")  # accepted with what comes after it, if not by itself
+    candidates = tuple(added if each is candidate else each for each in step.candidates)
+    return replace(
+        step,
+        candidates=candidates,
+        added=added,
+        bare_equivalent=None,
+        suspected=(),
+        indistinguishable=rivals,
+        contradicted=contradicted,
+    )
 
 
 def outdoes(one: EvaluatedModel, other: EvaluatedModel) -> bool:
-    """Whether a model does better than another: by evidence in independent samples, and fitted and held out."""
-    _, standard_errors = relative_error_reduction(other.errors.all_logs, one.errors.all_logs)
-    evidence = one.errors.independent_share * (bic(other.fit) - bic(one.fit))
-    return evidence > LEAST_BIC and standard_errors > LEAST_STANDARD_ERRORS
+    """Whether a model does better than another, fitted and held out."""
+    return not gain(other.fit, one.fit, other.errors, one.errors).rejection_reason
+
+
+def score_above(one: EvaluatedModel, other: EvaluatedModel) -> float:
+    """Return by how much a model is more likely than another: evidence of what was fitted and of what was held out."""
+    found = gain(other.fit, one.fit, other.errors, one.errors)
+    return found.bic + found.held_out_evidence
+
+
+def indistinguishable(best: EvaluatedModel, other: EvaluatedModel) -> bool:
+    """Whether two models are so nearly as likely that both may be what is missing."""
+    return score_above(best, other) < LEAST_BIC
 
 
 def _candidate(
@@ -179,10 +154,11 @@ def _candidate(
 ) -> EffectCandidate:
     if isinstance(model, str):
         return EffectCandidate(number, name, model, None, None, False)
-    found = gain(before.fit, model.fit, before.errors, model.errors, before.floor_m)
+    least = OVERWHELMING_BIC if before.scatters else LEAST_BIC
+    found = gain(before.fit, model.fit, before.errors, model.errors, least)
     beyond = _beyond(name, model.fit, library[name])
     same = bare_parameter(name, library)
-    reason = beyond or found.rejection_reason(before.at_floor)
+    reason = beyond or found.rejection_reason
     if same and not reason:
         reason = f"no record of pressure and position tells it from {same}"
     return EffectCandidate(number, name, reason, model, found, not beyond)
@@ -216,11 +192,9 @@ def _best(
     return ordered, first if as_good else best
 
 
-def _bare_equivalent(
-    candidates: Sequence[EffectCandidate], at_floor: bool, library: Mapping[str, Effect]
-) -> EffectCandidate | None:
+def _bare_equivalent(candidates: Sequence[EffectCandidate], library: Mapping[str, Effect]) -> EffectCandidate | None:
     """Return the best that would be accepted but that it is the bare valve by another name, if there is one."""
-    passing = _passing(candidates, at_floor)
+    passing = _passing(candidates)
     return max((each for each in passing if bare_parameter(each.name, library)), key=_evidence, default=None)
 
 
@@ -237,8 +211,8 @@ def _better_than(equivalent: EffectCandidate, candidates: Sequence[EffectCandida
 def _suspect(candidates: Sequence[EffectCandidate], library: Mapping[str, Effect]) -> EffectCandidate | None:
     """Return what has the most evidence: of all that would be accepted if more were left, or that have overwhelming."""
     overwhelming = [each for each in candidates if each.gain and each.gain.overwhelming]
-    suspects = [*_passing(candidates, at_floor=False), *overwhelming]
-    return max((each for each in suspects if _may_be_there(each, library)), key=_evidence, default=None)
+    suspects = [*_passing(candidates), *overwhelming]
+    return max((each for each in suspects if may_be_there(each, library)), key=_evidence, default=None)
 
 
 def _rivals(
@@ -249,9 +223,8 @@ def _rivals(
     What narrowly passes the rule proves no more than what narrowly does not.
     """
     assert best.model
-    logs = best.model.errors.all_logs
-    may_be_there = [each for each in candidates if each.model and _may_be_there(each, library)]
-    as_good = [each for each in may_be_there if each.model and indistinguishable(logs, each.model.errors.all_logs)]
+    there = [each for each in candidates if each.model and may_be_there(each, library)]
+    as_good = [each for each in there if each.model and indistinguishable(best.model, each.model)]
     models = [each.model for each in as_good if each.model]
     contradicted = tuple(each for each in as_good if each.model and pressure_speaks_against(each.model, models))
     backed = [each.name for each in as_good if each not in contradicted]
@@ -280,18 +253,18 @@ def pressure_speaks_against(model: EvaluatedModel, others: Sequence[EvaluatedMod
     return model.pressure is not None and any(each.speaks_against(model.pressure) for each in known)
 
 
-def _may_be_there(candidate: EffectCandidate, library: Mapping[str, Effect]) -> bool:
+def may_be_there(candidate: EffectCandidate, library: Mapping[str, Effect]) -> bool:
     """Whether an effect is physical, has evidence, and is not the bare valve by another name."""
     evident = candidate.physical and not candidate.outdone and candidate.evidence > LEAST_BIC
     return evident and bare_parameter(candidate.name, library) is None
 
 
-def _passing(candidates: Sequence[EffectCandidate], at_floor: bool) -> list[EffectCandidate]:
-    """Return the physical ones that pass the rule, as it is where the error before is at the floor, or above."""
+def _passing(candidates: Sequence[EffectCandidate]) -> list[EffectCandidate]:
+    """Return the physical ones that pass the rule."""
     return [
         each
         for each in candidates
-        if each.physical and not each.outdone and each.gain and not each.gain.rejection_reason(at_floor)
+        if each.physical and not each.outdone and each.gain and not each.gain.rejection_reason
     ]
 
 

@@ -22,12 +22,11 @@ from sim.composition import Composition
 from sim.open_loop import respond
 from workbench.data.noise_floor import with_noise
 from workbench.data.record import Record, ready
-from workbench.fit.descent import descended_through
 from workbench.fit.fit_result import Fit
-from workbench.fit.objective import SimulationError
+from workbench.fit.fitting import problem_of
+from workbench.fit.minimiser import derivatives
+from workbench.fit.onsets import with_onsets
 from workbench.fit.threads import on_threads
-from workbench.model.free_run import FreeRun
-from workbench.model.parameters import free_parameters
 
 LENGTH_S = 24.0
 REST_S = 2.0
@@ -160,8 +159,15 @@ def _answers(
 
 
 def _left(answer: Record, rival: Fit) -> float:
-    """Return the rms error of the rival refitted to an answer, in units of the noise."""
-    composition = Composition.from_file(rival.valve)
-    parameters = free_parameters(composition, tuple(rival.parameters))
-    error = SimulationError(FreeRun(composition, answer), composition, parameters, composition.theta)
-    return error.rms_m(descended_through(error, error.coordinates(composition.theta))) / error.sigma_m
+    """Return the rms residual of the rival on an answer, told when the stem moves, less what its parameters take up.
+
+    What these take up is worked out by their derivatives: one step of a refit tells inputs apart.
+    """
+    of, composition = problem_of(rival, answer), Composition.from_file(rival.valve)
+    like = of.likelihood(composition, tuple(rival.parameters))
+    onsets_s, groups = with_onsets(like, composition.theta)
+    jacobian = derivatives(like, like.coordinates(composition.theta), onsets_s)
+    weight = (1.0 + (groups.whole / like.weights.soft) ** 2) ** -0.25
+    r = weight * groups.whole
+    left = r - (weight[:, None] * jacobian) @ np.linalg.lstsq(weight[:, None] * jacobian, r)[0]
+    return float(np.sqrt(np.mean(left**2)))

@@ -1,15 +1,11 @@
 """How far the noise of a measured pressure moves the stem that it drives in a simulation.
 
-Driven by a measured pressure, a stem obeys the transmitter's noise as well: it leaves at another time, and lands
-elsewhere. So a valve that is known exactly is off, and by as much as noise drawn once more moves it:
+    d = x(p + e) - x(p)      e white, of the standard deviation that the pressure shows at rest (`config.noise`); told
+                             when the stem moves, so that it lands elsewhere, and leaves when it left
+    typical = median rms of d, block by block of time
 
-    d = x(p + e) - x(p)      e white, of the standard deviation that the pressure shows at rest (`config.noise`)
-    typical = exp(median l_b of d)          over all draws; l_b as `block_errors` has it
-    mistimed^2 = mean d^2 - typical^2
-
-x is the valve as it was fitted first. What is typical is part of the floor; the rms may be more by what is mistimed.
-Noise that hangs together from sample to sample does not show at rest, nor is it told from what the supply does: then
-nothing is added.
+x is the valve as it was fitted first: a valve that is known exactly is off by as much. It is part of the floor. Noise
+that hangs together from sample to sample does not show at rest: then nothing is added.
 """
 
 from dataclasses import replace
@@ -18,8 +14,10 @@ import numpy as np
 
 from config.noise import position_noise_m
 from config.recording import Column
+from sim.composition import Composition
 from workbench.data.held_out import Part, PressureScatter, Split, residual_m
 from workbench.fit.fit_result import Fit
+from workbench.fit.fitting import problem_of
 from workbench.select.block_errors import block_logs, block_s
 
 DRAWS = 4
@@ -36,10 +34,9 @@ def with_pressure_scatter(split: Split, fit: Fit) -> Split:
     found = [_moved(part, fit, noise_pa) for part in (split.train, split.test) if (noise_pa := _noise_pa(part))]
     if not found:
         return split
-    noises_pa, logs, squares = zip(*found, strict=True)
+    noises_pa, logs = zip(*found, strict=True)
     typical_m = float(np.exp(np.median(np.concatenate(logs))))
-    mistimed_m = max(float(np.mean(np.concatenate(squares))) - typical_m**2, 0.0) ** 0.5
-    scatter = PressureScatter(max(noises_pa), typical_m, mistimed_m)
+    scatter = PressureScatter(max(noises_pa), typical_m)
     return replace(split, floor_m=float(np.hypot(split.floor_m, typical_m)), by_pressure=scatter)
 
 
@@ -50,16 +47,17 @@ def _noise_pa(part: Part) -> float | None:
     return position_noise_m(record.measured_pa, None if record.by_setpoint else record.command_pa)
 
 
-def _moved(part: Part, fit: Fit, noise_pa: float) -> tuple[float, Column, Column]:
-    """Return the noise, Pa, and of what it moves the stem by the log rms a block, and the squares, m^2; all draws."""
+def _moved(part: Part, fit: Fit, noise_pa: float) -> tuple[float, Column]:
+    """Return the noise, Pa, and of what it moves the stem by the log rms a block; all draws."""
     record, generator = part.record, np.random.default_rng(0)
+    composition = Composition.from_file(fit.valve)
 
     def simulated_m(noise_pa: Column | float) -> Column:
         assert record.pressure_pa is not None
-        return residual_m(part, fit.indicated_m(replace(record, pressure_pa=record.pressure_pa + noise_pa)))
+        drawn = replace(record, pressure_pa=record.pressure_pa + noise_pa)
+        run = problem_of(fit, drawn).likelihood(composition, ()).run
+        return residual_m(part, run.run(composition.theta, run.first_onsets_s()).indicated_m)
 
     bare_m = simulated_m(0.0)
     moved_m = [simulated_m(generator.normal(0.0, noise_pa, len(record))) - bare_m for _ in range(DRAWS)]
-    logs = [block_logs(record.time_s, each, 0.0, block_s(part)) for each in moved_m]
-    squares = np.concatenate(moved_m) ** 2
-    return noise_pa, np.concatenate(logs), squares[np.isfinite(squares)]
+    return noise_pa, np.concatenate([block_logs(record.time_s, each, 0.0, block_s(part)) for each in moved_m])

@@ -4,6 +4,7 @@
     R^2 = (sum (e - mean)^2 - sum (e - e_hat)^2) / sum ((e - mean)^2 + n^2)
                                                      e_hat from ridge regression on the other four fifths, n negligible
 
+R^2 counts where it is no chance: -n' log(1 - R^2) > `SURELY`, n' the number of independent samples.
 The fifths are whole stretches of time. The residual is clipped at 5 of its robust deviations, so that one missed slip
 is not the whole of it. On noise R^2 is 0 or less.
 """
@@ -14,6 +15,7 @@ import numpy as np
 import numpy.typing as npt
 
 from config.recording import Column
+from signals.independence import independent_share
 from workbench.data.motion import directions, velocity_m_per_s
 from workbench.data.record import Record
 
@@ -22,6 +24,8 @@ RIDGE = 0.03
 """Of the number of samples; the regressors have variance 1."""
 STRUCTURED = 0.1
 """R^2 above which the residual is not the noise's."""
+SURELY = 10.0
+"""Odds of 150 to 1."""
 CLIPPED = 5.0
 FEWEST = 100
 
@@ -53,7 +57,9 @@ def structure(record: Record, residual_m: Column, negligible_m: float = 0.0) -> 
         spread[here] = error[here] - mean
         left[here] = spread[here] - matrix[here] @ slopes
     total = float(np.sum(spread**2)) + rows.size * negligible_m**2
-    return float(np.sum(spread**2) - np.sum(left**2)) / total if total > 0.0 else 0.0
+    found = float(np.sum(spread**2) - np.sum(left**2)) / total if total > 0.0 else 0.0
+    independent = rows.size * independent_share(error)
+    return found if -independent * np.log1p(-found) > SURELY else min(found, 0.0)
 
 
 def clipped(error_m: Column) -> Column:

@@ -1,0 +1,120 @@
+"""A record to be explained, made once and handed on whole: what drives the stem, how it is sampled, when it moved."""
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+
+from config.errors import InputError
+from config.valve_file import ValveParameters
+from sim.composition import BASE, SPRING, Composition
+from sim.effect import Effect
+from workbench.data.record import Record, require_units
+from workbench.fit.likelihood import WEIGHTS, Likelihood
+from workbench.model.parameters import AT_REST, BEHIND_POSITIONER, DEFAULT, LANDED, free_parameters
+from workbench.model.sampling import NO_LANDING, Motion, Sampling, sampling
+from workbench.model.told_run import ToldMove, told_moves
+
+LEAST_MOVES = 3
+"""Moves of the stem, of which three parameters of a balance of forces, and nothing more, may follow."""
+FREE = {Motion.DYNAMIC: DEFAULT, Motion.QUASI_STATIC: AT_REST, Motion.LANDINGS: LANDED}
+"""What of the bare valve is fitted by default."""
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class Problem:
+    """A record, and what of it is known before any fit."""
+
+    record: Record
+    told: tuple[ToldMove, ...]
+    by: Sampling
+    """How it is sampled."""
+    from_pressure: bool
+    """Whether the measured pressure drives the stem, and not the command."""
+    load_n: float
+    """To which a break-away tells static friction, N: of the valve as known before any fit, the same for all models."""
+
+    @property
+    def by_setpoint(self) -> bool:
+        """Whether a positioner drives the stem, by its set point."""
+        return self.record.by_setpoint and not self.from_pressure
+
+    def likelihood(
+        self,
+        composition: Composition,
+        free: Sequence[str] | None = None,
+        scale: ValveParameters | None = None,
+        known: ValveParameters | None = None,
+    ) -> Likelihood:
+        """Return the likelihood of a valve over its free parameters, by default all that the record may tell.
+
+        Args:
+            composition: the valve.
+            free: names of parameters.
+            scale: as of `workbench.model.parameters.free_parameters`.
+            known: the same.
+
+        Raises:
+            InputError: as `free_parameters`, and of a valve that the record cannot drive.
+        """
+        names = self._free(composition) if free is None else free
+        parameters = free_parameters(composition, names, scale, known)
+        return Likelihood(
+            composition,
+            self.record,
+            self.told,
+            parameters,
+            by=self.by,
+            from_pressure=self.from_pressure,
+            load_n=self.load_n,
+        )
+
+    def _free(self, composition: Composition) -> list[str]:
+        of_effects = [
+            f"{each.name}.{key}"
+            for each in composition.effects
+            if not (self.from_pressure and "pressure" in each.functions) and not self.by.left_out(each)
+            for key, declared in each.parameters.items()
+            if not declared.given
+        ]
+        of_base = list(BEHIND_POSITIONER if self.by_setpoint else FREE[self.by.motion])
+        if composition.theta[SPRING] == 0.0 and BASE[SPRING] in of_base:
+            of_base.remove(BASE[SPRING])
+        return [*of_base, *of_effects]
+
+    def require_shown(self, effects: Sequence[Effect]) -> None:
+        """Refuse effects that a record sampled like this cannot show.
+
+        Raises:
+            InputError: names the effect and says why.
+        """
+        for each in effects:
+            if why := self.by.left_out(each):
+                raise InputError("recording", f"{each.name} cannot be fitted: it {why}")
+
+
+def problem(
+    record: Record, valve: ValveParameters, *, from_pressure: bool = False, by: Sampling | None = None
+) -> Problem:
+    """Return the problem of a record of a valve of which this is known; `by` in place of what the record asks for.
+
+    Raises:
+        InputError: other units than SI, or the stem moves too seldom, or one way alone.
+    """
+    require_units(record, valve)
+    told = told_moves(record)
+    _require_motion(record, told)
+    return Problem(record, told, by or sampling(record, valve), from_pressure, WEIGHTS.break_away * valve.coulomb_n)
+
+
+def _require_motion(record: Record, told: Sequence[ToldMove]) -> None:
+    if len(told) < LEAST_MOVES and 2 * sum(each.after - each.before for each in told) > len(record):
+        raise InputError("recording", NO_LANDING)
+    if len(told) < LEAST_MOVES:
+        raise InputError(
+            "recording", f"the stem moves {len(told)} times, at least {LEAST_MOVES} are needed to fit anything"
+        )
+    ways = {record.position_m[each.after] > record.position_m[each.before] for each in told}
+    if len(ways) < 2:
+        way = "opens" if ways.pop() else "closes"
+        raise InputError(
+            "recording", f"the stem only {way}: friction and spring cannot be told apart without both ways"
+        )
