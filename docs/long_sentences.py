@@ -13,7 +13,7 @@ ROOT = Path(__file__).parents[1]
 PAGES = [ROOT / "README.md", ROOT / "CONTRIBUTING.md", *sorted((ROOT / "docs").rglob("*.md"))]
 LONGEST_WORDS = 30
 """Words of a sentence that is read once; 25 are the aim."""
-MOST = 51
+MOST = 50
 """Longer sentences that there are."""
 FENCED = re.compile(r"^```.*?^```", re.MULTILINE | re.DOTALL)
 NO_TEXT = re.compile(r"<!--.*?-->|!\[[^\]]*\]\([^)]*\)", re.DOTALL)
