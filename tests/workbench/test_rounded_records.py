@@ -54,6 +54,6 @@ def test_few_rests_are_rounded_as_the_sensor_does(seed: int) -> None:
     recording, valve, truth = posed(Case("quantisation", seed, "poor"))
     base = fit(recording, valve, workers=1)
     found = fit(recording, valve, effects=("quantisation",), workers=1, base=base)
-    assert found.cost < WITHIN * true_cost(recording, truth)
+    assert found.cost < 1.1 * true_cost(recording, truth), "at the noise, nats above the truth"
     known_m = dict(truth.effect[0])["quantum_m"]
     assert found.parameters["quantisation.quantum_m"].value == pytest.approx(known_m, rel=1e-3)

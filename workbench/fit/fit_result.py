@@ -1,7 +1,7 @@
 """What a fit comes to: a valve, its parameters with their intervals, the searches behind it."""
 
 from collections.abc import Mapping
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from math import log
 from typing import TYPE_CHECKING, NamedTuple
 
@@ -14,7 +14,7 @@ from config.results.block import Block
 from config.results.result import Result
 from config.valve_file import ValveFile
 from signals.independence import independent_share
-from sim.composition import Composition
+from sim.composition import STATIC, Composition
 from sim.karnopp import Vector
 from workbench.compare.comparison_sentences import shortened
 from workbench.compare.measures import fit_percent
@@ -33,6 +33,8 @@ if TYPE_CHECKING:
 
 AT_BOUND = 1e-3
 """Of a coordinate's range, within which it is at the end of it."""
+TRIED_STATIC = 13
+"""Values of static friction in its interval: the free run is the same between the break-aways that each brings."""
 WANTS_OUT = 2.0
 """Slope of the cost at the end, in deviations: the least lies beyond it."""
 
@@ -161,7 +163,8 @@ class Fit(Result):
 def fit_at(problem: Problem, like: Likelihood, end: End, agreement: int) -> Fit:
     """Return the fit of where searches have ended, from so many starts."""
     determined = uncertainty(like, end)
-    theta, record = like.theta(end.z), problem.record
+    end, record = _as_runs_freely(like, end, determined), problem.record
+    theta = like.theta(end.z)
     error_m = like.run.run(theta, end.onsets_s).indicated_m - record.position_m
     return Fit(
         valve=like.composition.file(theta),
@@ -181,6 +184,29 @@ def fit_at(problem: Problem, like: Likelihood, end: End, agreement: int) -> Fit:
         load_n=problem.load_n,
         by=problem.by,
     )
+
+
+def _as_runs_freely(like: Likelihood, end: End, determined: Uncertainty) -> End:
+    """Return an end at the static friction, of those that break-aways leave open, with which a free run does best."""
+    rows = [i for i, each in enumerate(like.parameters) if each.index == STATIC]
+    if not rows or like.by.slow or like.record.by_setpoint:
+        return end
+    (i,) = rows
+    low, high = like.parameters[i].bounds
+    open_ = np.linspace(max(low, determined.lower[i]), min(high, determined.upper[i]), TRIED_STATIC)
+    run = FreeRun(like.composition, like.record, from_pressure=like.from_pressure, by=like.by)
+    seen_m = np.where(like.record.valid, like.record.position_m, np.nan)
+
+    def placed(value: float) -> Vector:
+        z = end.z.copy()
+        z[i] = value
+        return z
+
+    trials = [end.z, *(placed(float(value)) for value in open_)]
+    errors = [np.nanmean((run.position_m(like.theta(z)) - seen_m) ** 2) for z in trials]
+    best = trials[int(np.nanargmin(errors))] if np.isfinite(errors).any() else end.z
+    groups = like.at(like.theta(best), end.onsets_s)
+    return replace(end, z=best, groups=groups, cost=float(soft(groups.whole, like.weights.soft).sum()))
 
 
 def terms(like: Likelihood, groups: Groups) -> Terms:

@@ -151,7 +151,7 @@ class Likelihood:
         weights: Weights = WEIGHTS,
     ) -> None:
         self.composition, self.record, self.parameters, self.weights = composition, record, tuple(parameters), weights
-        self.by, self.load_n = by, load_n
+        self.by, self.from_pressure, self.load_n = by, from_pressure, load_n
         self.run = ToldRun(composition, record, tuple(told), by=by, from_pressure=from_pressure)
         self.layout = layout(record, told, weights)
         self.sigma_m = record.scale_m
