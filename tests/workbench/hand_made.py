@@ -80,7 +80,6 @@ def errors_of(error_m: float = FLOOR_M, *, structure: float = 0.0) -> BlockError
         train_block_m=error_m,
         test_block_m=error_m,
         logs=logs[FITTED_EVENTS:],
-        all_logs=logs,
         structure=structure,
         held_out=terms_of((error_m / FLOOR_M) ** 2, HELD_OUT_EVENTS),
     )

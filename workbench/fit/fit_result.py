@@ -206,7 +206,7 @@ def _as_runs_freely(like: Likelihood, end: End, determined: Uncertainty) -> End:
     errors = [np.nanmean((run.position_m(like.theta(z)) - seen_m) ** 2) for z in trials]
     best = trials[int(np.nanargmin(errors))] if np.isfinite(errors).any() else end.z
     groups = like.at(like.theta(best), end.onsets_s)
-    return replace(end, z=best, groups=groups, cost=float(soft(groups.whole, like.weights.soft).sum()))
+    return replace(end, z=best, groups=groups, cost=like.cost(groups.whole))
 
 
 def terms(like: Likelihood, groups: Groups) -> Terms:

@@ -18,7 +18,7 @@ from sim.karnopp import Vector
 from workbench.data.record import Record, ready, require_few_samples
 from workbench.data.stretches import informative
 from workbench.fit.fit_result import Fit, Terms, fit_at, terms
-from workbench.fit.likelihood import Likelihood, soft
+from workbench.fit.likelihood import Likelihood
 from workbench.fit.minimiser import End, begun, derivatives, ended
 from workbench.fit.onsets import with_onsets
 from workbench.fit.problem import Problem, problem
@@ -279,7 +279,7 @@ def _from_afar(
 def _settled(like: Likelihood, end: End) -> End:
     """Search on where other onsets suit the valve better than those that a search came to."""
     onsets_s, groups = with_onsets(like, like.theta(end.z))
-    if float(soft(groups.whole, like.weights.soft).sum()) > end.cost - NATS:
+    if like.cost(groups.whole) > end.cost - NATS:
         return end
     there = ended(like, end.z, onsets_s)
     return there if there.cost < end.cost else end

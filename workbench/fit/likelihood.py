@@ -197,6 +197,10 @@ class Likelihood:
         blocks = (sums / rows.count - mean[rows.rest_of]) * np.sqrt(rows.count)
         return Groups(e[rows.moving], mean * self.sigma_m / self.landing_m, blocks, self.break_rows(path, theta))
 
+    def cost(self, r: Vector) -> float:
+        """Return the soft-L1 cost of some residuals, (rows,)."""
+        return float(soft(r, self.weights.soft).sum())
+
     def break_rows(self, path: ToldPath, theta: Vector) -> Vector:
         """Return the residuals of the second factor."""
         F_s, bears, breaks = float(theta[STATIC]), path.bears_n[self.broken], path.breaks_n[self.broken]
@@ -210,7 +214,7 @@ def with_static(like: Likelihood, theta: Vector, path: ToldPath) -> Vector:
     ends_n = np.concatenate([path.bears_n[like.broken], path.breaks_n[like.broken]])
     ends_n = np.unique(ends_n[np.isfinite(ends_n) & (ends_n > theta[COULOMB])])
     trials = [theta] + [np.where(np.arange(theta.size) == STATIC, each, theta) for each in ends_n]
-    return min(trials, key=lambda there: float(soft(like.break_rows(path, there), like.weights.soft).sum()))
+    return min(trials, key=lambda there: like.cost(like.break_rows(path, there)))
 
 
 def soft(r: Vector, scale: float = WEIGHTS.soft) -> Vector:

@@ -17,7 +17,7 @@ from scipy.optimize import least_squares
 from sim.composition import COULOMB, SPRING, STATIC, VISCOUS
 from sim.karnopp import Vector
 from workbench.fit.breaking_off import go_on
-from workbench.fit.likelihood import Groups, Likelihood, soft
+from workbench.fit.likelihood import Groups, Likelihood
 from workbench.fit.onsets import by_onsets
 
 
@@ -130,9 +130,8 @@ def ended(
     )  # fmt: skip
     z, onsets_s = parted(np.asarray(found.x))
     groups = like.at(like.theta(z), onsets_s)
-    if coarsely:
-        return End(z, onsets_s, float(soft(groups.whole, like.weights.soft).sum()), groups, np.empty((0, 0)))
-    return End(z, onsets_s, float(soft(groups.whole, like.weights.soft).sum()), groups, derivatives(like, z, onsets_s))
+    jacobian = np.empty((0, 0)) if coarsely else derivatives(like, z, onsets_s)
+    return End(z, onsets_s, like.cost(groups.whole), groups, jacobian)
 
 
 def derivatives(like: Likelihood, z: Vector, onsets_s: Vector) -> Vector:

@@ -12,7 +12,7 @@ import numpy as np
 from sim.composition import COULOMB, STATIC, VISCOUS
 from sim.karnopp import Vector
 from workbench.fit.guesses import guessed_values
-from workbench.fit.likelihood import Groups, Likelihood, soft, with_static
+from workbench.fit.likelihood import Groups, Likelihood, with_static
 from workbench.fit.minimiser import SEARCH
 from workbench.model.parameters import Parameter, strengths
 
@@ -70,7 +70,7 @@ def with_strengths(
 def _likeliest(like: Likelihood, thetas: Iterable[Vector], onsets_s: Vector) -> Vector:
     """Return the coordinates of the likeliest of parameter vectors, each with its own static friction."""
     found = [_at_its_static(like, theta, onsets_s) for theta in thetas]
-    costs = [float(soft(groups.whole, like.weights.soft).sum()) for _, groups in found]
+    costs = [like.cost(groups.whole) for _, groups in found]
     return like.coordinates(found[int(np.argmin(costs))][0])
 
 
@@ -97,7 +97,7 @@ def effect_starts(
         for theta in _strewn(like, added, origin, points):
             found = like.at(theta, onsets_s)
             landed = found.landings * like.landing_m / (SEARCH.begin * like.sigma_m)
-            cost = float(soft(np.concatenate([landed, found.break_aways]), like.weights.soft).sum())
+            cost = like.cost(np.concatenate([landed, found.break_aways]))
             ranked.append((cost, len(ranked), like.coordinates(theta)))
     ranked.sort(key=lambda each: each[:2])
     return [z for _, _, z in ranked[:TRIED]]

@@ -22,7 +22,7 @@ from scipy.special import stdtrit
 
 from sim.composition import STATIC
 from sim.karnopp import Vector
-from workbench.fit.likelihood import Likelihood, Rows, soft
+from workbench.fit.likelihood import Likelihood, Rows
 from workbench.fit.minimiser import End
 from workbench.fit.onsets import motion_rows
 
@@ -134,7 +134,7 @@ def _static_interval(like: Likelihood, end: End, i: int) -> tuple[float, float]:
     for z in at:
         there = theta.copy()
         like.parameters[i].put(there, float(z))
-        costs.append(float(soft(like.break_rows(path, there), like.weights.soft).sum()))
+        costs.append(like.cost(like.break_rows(path, there)))
     scatter = max(1.0, 2.0 * min(costs) / max(like.broken.size - 1, 1))
     near = at[np.array(costs) <= min(costs) + RISE_95 * scatter]
     return float(near.min()), float(near.max())

@@ -63,14 +63,10 @@ class BlockErrors(Brief):
     """Median of the held-out events' errors."""
     logs: Column
     """l_k of the held-out events, (events,)."""
-    all_logs: Column
-    """l_k of the fitted and the held-out events, (events,)."""
     structure: float
     """How much of the residual hangs on the state, fitted or held out, whichever is more."""
     held_out: Terms
     """The likelihood of what is held out."""
-    independent_share: float = 1.0
-    """Share of the events that are independent."""
 
     def at_floor(self, floor_m: float | None) -> bool:
         """Whether no model could do better: in a typical event, and by the plain error, fitted and held out.
@@ -112,14 +108,12 @@ def block_errors(fit: Fit, split: Split) -> BlockErrors:
     if not np.isfinite(held_out_m).any():
         raise InputError(HELD_OUT_RECORDING, NO_LANDING)
     negligible_m = NEGLIGIBLE * split.scale_m
-    fitted_logs, logs = _logs(*fitted, train), _logs(*held_out, test)
     return BlockErrors(
         train_rmse_m=_rms(fitted_m),
         test_rmse_m=_rms(held_out_m),
         train_block_m=float(np.median(_event_errors_m(fitted[0], fitted_m, train))),
         test_block_m=float(np.median(_event_errors_m(held_out[0], held_out_m, test))),
-        logs=logs,
-        all_logs=np.concatenate([fitted_logs, logs]),
+        logs=_logs(*held_out, test),
         structure=max(structure(each.record, e, negligible_m) for each, e in ((train, fitted_m), (test, held_out_m))),
         held_out=terms(held_out[0], _of_counted(*held_out, test)),
     )

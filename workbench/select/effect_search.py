@@ -3,7 +3,7 @@
     score(model) = evidence(model, base) + 2 (log-likelihood of what is held out, less the base's)
 
 A round extends each of the best `BEAM` models, the bare one by every effect, others by the `SCREENED` whose tangents
-promise most, and ranks all that it comes to by their scores. Rounds go on while some extension is accepted, and more
+promise most, and ranks all that it comes to by their scores. Rounds go on while some extension is evident, and more
 than the noise is left, up to three effects. The best model of all is, of those as likely as the likeliest, that of the
 fewest effects. Its steps are read off the beam: each adds the effect that the beam added there, beside all that were
 tried there.
