@@ -8,6 +8,7 @@ from time import perf_counter, sleep
 import numpy as np
 import numpy.typing as npt
 
+from benchmarks import hardships
 from config.valve_file import EffectTable, load_valve, shipped_valve
 from positioner.daemon.refinement_process import RefinementProcess
 from positioner.estimation import Estimates, Identification, IdentificationSettings
@@ -16,7 +17,7 @@ from positioner.estimation.batch import BatchSettings, identify
 from positioner.estimation.online import READINGS
 from positioner.estimation.refiner import InProcessRefiner, Refinement, RefinementJob
 from positioner.estimation.weighted import CHAINS, ROWS, Feeds, kernel
-from positioner.paper import hardships, noise_table
+from positioner.paper import noise_table
 from sim.valve import Valve
 
 SAMPLES = 800

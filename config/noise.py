@@ -288,16 +288,6 @@ def _rests(position_m: Array, quantum: float) -> bool:
     return windows.size > 0 and bool(np.mean(np.ptp(windows, axis=1) <= 1.5 * quantum) >= LEAST_LEVEL)
 
 
-def _share_alike(changes: Array, quantum: float) -> float:
-    """Return how many of the changes, (n,), m, are none, of these and those that may be noise's: small, to and fro."""
-    still = np.abs(changes) <= 0.5 * quantum
-    moved = changes[~still]
-    back = np.append(False, moved[1:] * moved[:-1] < 0.0)
-    near = back & (np.abs(moved) <= NEAR * quantum) if quantum else back
-    alike, noise = np.count_nonzero(still), np.count_nonzero(near) / TO_AND_FRO
-    return alike / (alike + noise) if alike else 0.0
-
-
 def _longest_by_chance(changes: Array, quantum: float) -> float:
     """Return how many like readings may follow one another, by how readings change from one to the next, (n,), m.
 

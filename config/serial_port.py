@@ -4,7 +4,7 @@ t_c     = b / B                  s, one character: b bits (start, 8 data, parity
 t_3.5   = 3.5 t_c                s, least silence between two frames; 1.75 ms above 19200 baud, whatever B is
 """
 
-from typing import Annotated, Literal, get_args
+from typing import Annotated, Literal
 
 from pydantic import Field
 
@@ -14,7 +14,6 @@ FASTEST_SCALED_BAUD = 19200
 FIXED_SILENCE_S = 1.75e-3
 
 Baud = Literal[1200, 2400, 4800, 9600, 19200, 38400, 57600, 115200, 230400, 460800, 921600]
-BAUDS: tuple[int, ...] = get_args(Baud)
 RtuUnit = Annotated[int, Field(ge=1, le=247)]
 
 

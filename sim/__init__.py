@@ -3,7 +3,6 @@
 Its files:
 
     karnopp, first_order_lag             the equations, and how a step is taken
-    misfit                               how far a response is from measured positions, and what that costs
     told                                 the equations of a stem that is told when it moves
     quasi_static                         the same without inertia, for samples farther apart than a slide lasts
     effect, effects                      how an effect is written; those that come along

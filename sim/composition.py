@@ -105,16 +105,6 @@ class Composition:
         self._either.begin(theta, state, time_s, position_m, velocity_m_per_s, command_pa)
         return state
 
-    def balance_n(self, theta: Vector, landings: Vector, arriving_m_per_s: float, speed_m_per_s: float) -> Vector:
-        """Return F_e, F_c and F_s, N, (landings, 3), of a stem that has slid to each of the landings, (landings, 7).
-
-        Their columns and the speeds are those of `sim.karnopp.balance`.
-        """
-        forces_n = np.empty((len(landings), 3))
-        state = np.zeros(self.state_size)
-        self._either.balance(theta, state, landings, arriving_m_per_s, speed_m_per_s, forces_n)
-        return forces_n
-
     @property
     def _either(self) -> EitherKernel:
         """Whichever kernel is there."""

@@ -76,14 +76,8 @@ DIFFERENCE_M = 1e-7
 """Half-width of the central difference that gives the stiffness -dF_e/dx."""
 DIFFERENCE_V = 1e-3
 """Of |v| + v_s, for the difference that gives the damping -dv'/dv."""
-SLIDE_S = 0.01
-"""What a slide takes for the memories of friction,"""
-LONG_S = 100.0
-"""and for a sensor: it shows the position itself."""
-CORRECTIONS = 3
-"""Corrections of a position until the sensor shows it where it was measured."""
 BALANCINGS = 6
-"""The same, and of a pressure until it balances forces that depend on it."""
+"""Corrections of a pressure until it balances forces that depend on it."""
 
 MEMORY = 7
 """Where the effects' memories begin in the state vector, after the Condition."""
@@ -557,28 +551,6 @@ def respond(
         path[3, i] = now.v
         path[4, i] = now.indicated
     write(state, now)
-
-
-def balance(theta: Vector, state: Vector, landings: Vector, arriving: float, speed: float, forces: Vector) -> None:
-    """Write F_e, F_c and F_s, N, of a stem that has slid to where a sensor shows it, into a row of forces each.
-
-    A row of landings: t of the landing, t of the forces, position shown, that before the slide, p, direction of the
-    slide, direction of (impending) motion. Speeds: `arriving` at which the slide ended, `speed` of the forces.
-    """
-    valve, q, z = karnopp(theta), theta, state
-    for i in range(len(landings)):
-        t, shown, p, way = landings[i, 1], landings[i, 2], landings[i, 4], landings[i, 6]
-        slide = shown - landings[i, 3]
-        x = shown
-        for _ in range(CORRECTIONS):
-            start_stem(x - slide, 0.0, Stem(t - LONG_S, x - slide, 0.0, p), q, z)
-            _, indicated = sensor(x - slide, x, LONG_S, Stem(t, x, 0.0, p), q, z)
-            x += shown - indicated
-        start_stem(landings[i, 3], 0.0, Stem(landings[i, 0] - SLIDE_S, landings[i, 3], 0.0, p), q, z)
-        remember(landings[i, 3], SLIDE_S, Stem(landings[i, 0], x, arriving * landings[i, 5], p), q, z)
-        stem = Stem(t, x, speed * way, p)
-        forces[i, 0] = external_force(valve, stem, q, z)
-        forces[i, 1], forces[i, 2] = friction(valve.F_c, valve.F_s, way, stem, q, z)
 
 
 def read(state: Vector) -> Condition:

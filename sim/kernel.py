@@ -26,14 +26,13 @@ from pathlib import Path
 from typing import Any
 
 from config.lock_file import lock_descriptor
-from sim import karnopp, kernel_linker, machine_code, misfit, quasi_static, told
+from sim import karnopp, kernel_linker, machine_code, quasi_static, told
 from sim.effect import Effect
 from sim.karnopp import MEMORY, Vector
 from sim.kernel_source import SHARED, Filling, effect_source, fillings
 from sim.machine_code import MATRIX, NUMBER, VECTOR, Entry, is_bitcode, loaded, processor, translated
 
 BASE = Path(karnopp.__file__)
-MISFIT = Path(misfit.__file__)
 SLOW = Path(quasi_static.__file__)
 TOLD = Path(told.__file__)
 COMPILER = Path(__file__).with_name("kernel_compiler.py")
@@ -44,17 +43,11 @@ BITCODE = ".bc"
 EITHER: Mapping[str, tuple[int, ...]] = {
     "rest": (VECTOR, VECTOR, NUMBER, NUMBER, NUMBER),
     "begin": (VECTOR, VECTOR, NUMBER, NUMBER, NUMBER, NUMBER),
-    "balance": (VECTOR, VECTOR, MATRIX, NUMBER, NUMBER, MATRIX),
-    "compare": (VECTOR, VECTOR, VECTOR, VECTOR, VECTOR),
 }
 """Entries with and without inertia."""
 ENTRIES: Mapping[str, tuple[int, ...]] = {
     **EITHER,
     "respond": (VECTOR, VECTOR, VECTOR, VECTOR, NUMBER, NUMBER, MATRIX),
-    "misfit": (
-        *(VECTOR, VECTOR, VECTOR, VECTOR, NUMBER, NUMBER),
-        *(MATRIX, MATRIX, VECTOR, VECTOR, VECTOR, VECTOR),
-    ),
 }
 SLOW_ENTRIES: Mapping[str, tuple[int, ...]] = {
     **EITHER,
@@ -70,24 +63,21 @@ TOLD_ENTRIES: Mapping[str, tuple[int, ...]] = {
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class EitherKernel:
-    """`rest`, `begin` and `balance` of `karnopp.py`, `compare` of `misfit.py`, with the effects in their places."""
+    """`rest` and `begin` of `karnopp.py`, with the effects in their places."""
 
     digest: str
     state_size: int
     rest: Entry[Vector, Vector, float, float, float]
     begin: Entry[Vector, Vector, float, float, float, float]
-    balance: Entry[Vector, Vector, Vector, float, float, Vector]
-    compare: Entry[Vector, Vector, Vector, Vector, Vector]
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Kernel(EitherKernel):
-    """The same and `respond` of `karnopp.py`, `misfit` of `misfit.py`."""
+    """The same and `respond` of `karnopp.py`."""
 
     bitcode: bytes = field(repr=False)
     """LLVM's, of the functions as `sim.machine_code` calls them."""
     respond: Entry[Vector, Vector, Vector, Vector, float, float, Vector]
-    misfit: Entry[Vector, Vector, Vector, Vector, float, float, Vector, Vector, Vector, Vector, Vector, Vector]
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -120,7 +110,7 @@ def kernel(effects: Sequence[Effect]) -> Kernel:
     Raises:
         InputError: an effect's function is not what numba can compile; names its file.
     """
-    digest, bitcode, compiled = _of(effects, (BASE, MISFIT), ENTRIES)
+    digest, bitcode, compiled = _of(effects, (BASE,), ENTRIES)
     return Kernel(digest=digest, bitcode=bitcode, state_size=_state_size(effects), **compiled)
 
 
@@ -130,7 +120,7 @@ def quasi_static_kernel(effects: Sequence[Effect]) -> QuasiStaticKernel:
     Raises:
         InputError: as `kernel`.
     """
-    digest, _, compiled = _of(effects, (BASE, MISFIT, SLOW), SLOW_ENTRIES)
+    digest, _, compiled = _of(effects, (BASE, SLOW), SLOW_ENTRIES)
     return QuasiStaticKernel(digest=digest, state_size=_state_size(effects), **compiled)
 
 

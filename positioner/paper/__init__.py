@@ -5,5 +5,5 @@ It is under the roof, and knows the simulated valve.
     scenario                        the run of its section 5, on the simulated valve with a noise of one's choice
     formulas, findings              its formulas on such a run, and what that shows of its claims
     seed_figures                    its figures 3 to 7
-    noise_table, hardships          estimators against the Cramér-Rao bound: under white noise, and on a fieldbus
+    noise_table                     estimators against the Cramér-Rao bound, under white noise
 """

@@ -32,7 +32,6 @@ from config.results.result import Brief
 from config.valve_file import EffectTable, ValveFile
 from sim.composition import AREA, COULOMB, STATIC, Composition
 from sim.karnopp import Vector, read, write
-from sim.misfit import AT_ONCE, Judge, put_back
 from sim.open_loop import (
     INDICATED,
     PATH_ROWS,
@@ -71,8 +70,6 @@ class Accuracy:
 
 FINE = Accuracy(1.0, 3e-4)
 """Within 1 um rms, where effects remember, of steps a hundredth as long: a fiftieth of a transmitter's noise."""
-ROUGH = Accuracy(2.0, 1e-3)
-"""Within 50 um. A wider tolerance hides from the finite differences what a little viscous friction does."""
 PART_S, MOST_PARTS = 2e-3, 8
 """Parts of a sample over which a measured pressure is held: about as long, at most so many."""
 BEYOND_PA = 1e12
@@ -109,8 +106,6 @@ class Segment(NamedTuple):
     """From sample to sample."""
     step_s: float
     """Longest of the integration, s."""
-    shots: Vector
-    """Parts before which the stem is put back, and to where it is shown then, m, (shots, 2)."""
 
 
 class FreeRun:
@@ -204,38 +199,6 @@ class FreeRun:
         require_numbers(self._composition, self.record.time_s[judged], indicated_m[judged])
         return indicated_m
 
-    def misfit(self, theta: Vector, measured_m: Column, judge: Judge) -> tuple[Column, float]:
-        """Simulate and compare with positions, m, (n,), as `sim.misfit` does: r, (n,), and what they cost.
-
-        Rows without a position, or not judged, hold nothing. A run is given up once it costs the limit.
-        """
-        errors, cost, by = np.empty(len(self.record)), np.zeros(1), np.array(judge)
-        if self.by.slow:
-            for glided, path in self._glides(theta):
-                apart = np.empty(glided.judged.size)
-                shown_m = path[INDICATED, glided.at]
-                self._composition.quasi_static.compare(shown_m, measured_m[glided.judged], by, apart, cost)
-                errors[glided.judged] = apart
-                if cost[0] >= judge.limit:
-                    break
-            return errors, float(cost[0])
-        vector, path = np.array(theta[self._kept]), np.empty((PATH_ROWS, AT_ONCE + 1))
-        for each in self._segments:
-            drive_pa, state = self._started(vector, each)
-            rows = slice(each.first, each.end)
-            seen_m, apart = measured_m[rows], errors[rows]
-            if each.parts > 1:
-                seen_m, apart = np.full(each.periods_s.size + 1, np.nan), np.empty(each.periods_s.size + 1)
-                seen_m[:: each.parts] = measured_m[rows]
-            self._composition.kernel.misfit(
-                *(vector, state, drive_pa, each.periods_s, each.step_s, self._tolerance),
-                *(each.shots, path, seen_m, by, apart, cost),
-            )
-            errors[rows] = apart[:: each.parts]
-            if cost[0] >= judge.limit:
-                break
-        return errors, float(cost[0])
-
     def _glides(self, theta: Vector) -> Iterator[tuple[SlowSegment, Vector]]:
         """Simulate each segment without inertia: it, and what the kernel writes, (5, rows kept)."""
         vector = np.array(theta[self._kept])
@@ -246,23 +209,15 @@ class FreeRun:
             yield each, path[:, :: each.parts]
 
     def _paths(self, theta: Vector) -> Iterator[tuple[int, int, Vector]]:
-        """Simulate each segment, from shot to shot: its rows and what the kernel writes, (5, rows)."""
+        """Simulate each segment: its rows and what the kernel writes, (5, rows)."""
         vector = np.array(theta[self._kept])
         for each in self._segments:
             drive_pa, state = self._started(vector, each)
-            shown_m = {int(period): float(to_m) for period, to_m in each.shots}
-            at, known = 0, 0  # but for the first, a row stands in the path before
-            for over in (*shown_m, each.periods_s.size):
-                if known:
-                    put_back(state, shown_m[at])
-                path = np.empty((PATH_ROWS, over - at + 1))
-                held = slice(at, over)
-                self._composition.kernel.respond(
-                    vector, state, drive_pa[held], each.periods_s[held], each.step_s, self._tolerance, path
-                )
-                rows = each.first + at // each.parts + known, each.first + over // each.parts + 1
-                yield *rows, path[:, known * each.parts :: each.parts]
-                at, known = over, 1
+            path = np.empty((PATH_ROWS, each.periods_s.size + 1))
+            self._composition.kernel.respond(
+                vector, state, drive_pa, each.periods_s, each.step_s, self._tolerance, path
+            )
+            yield each.first, each.end, path[:, :: each.parts]
 
     def _started(self, theta: Vector, segment: Segment | SlowSegment) -> tuple[Vector, Vector]:
         """Return the pressures of a segment's periods, Pa, and the state that it begins with."""
@@ -355,7 +310,7 @@ def _segment(
     step_s = checked_step(min(float(periods_s.max()), longest_s))
     begin = initial_state(record, first, end, moving=not by_setpoint)
     before = before_start(record, first, end, begin.position_m) if by_setpoint else None
-    return Segment(first, end, begin, before, lead, held_pa, load_n, periods_s, parts, step_s, np.empty((0, 2)))
+    return Segment(first, end, begin, before, lead, held_pa, load_n, periods_s, parts, step_s)
 
 
 def _behind_pressure(composition: Composition) -> tuple[Composition, list[int]]:

@@ -87,13 +87,6 @@ class LiveModel:
         _put(theta, parameter, share)
         return float(theta[parameter.index])
 
-    def share_of(self, parameter: Parameter, value: float) -> float:
-        """Return where in the range a value, SI, stands; outside it, the nearer end."""
-        theta = np.array(self.setting.theta)
-        theta[parameter.index] = value
-        least, most = parameter.bounds
-        return (parameter.coordinate(theta) - least) / (most - least)
-
     def put(self, parameter: Parameter, value: float) -> None:
         """Set a parameter to a value, SI.
 

@@ -25,7 +25,6 @@ SUFFIXES = (".csv", ".txt", ".parquet", ".xlsx", ".mat")
 MOST_BUTTONS = 48
 """Files that are offered by a button each."""
 MOST_BLIND = 10_000
-OWN_FILE = "a file of mine"
 
 
 class OpenPanel:

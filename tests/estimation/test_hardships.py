@@ -3,8 +3,8 @@
 import numpy as np
 import pytest
 
+from benchmarks.hardships import Hardship, hardships, lines
 from config.valve_file import load_valve, shipped_valve
-from positioner.paper.hardships import Hardship, hardships, lines
 
 pytestmark = pytest.mark.long
 
