@@ -239,6 +239,7 @@ class Refusal(Code):
         "landings before and after a moment disagree: the sensor jumped, or something shifted the stem; try again",
     )
     PRELOAD_EXPLAINS_AS_WELL = 28, "a preload would explain the motion as well, with another b/c"
+    DRIFT_EXPLAINS_AS_WELL = 32, "a sensor that drifts would explain the motion as well, with another b/c or k/c"
     TOO_SLOW = 30, "the stem moves too slowly, or too much as its command does, for its inertia to show: step it"
     NO_BREAKAWAY = 31, "the stem has not been seen to break away from a rest"
     BROKEN_OFF = 29, "S3 was broken off before it was complete: by a fault, another mode, or a stem that did not answer"

@@ -20,9 +20,12 @@ The daemon's refinement and `positioner estimate` are this one function. What is
 - where no jump of the pressure begins a motion, its first milliseconds are the drop from F_s to F_c, whose course the
   model leaves out. The mass must then be identifiable from what follows after five of the stem's time constants.
 
-A preload is no part of the model, and yet a motion both ways under one can be fitted to the noise: with an absurd mass,
-and b/c off by half. So the motions are fitted again with a force of one direction beside friction. Where that explains
-them as well, and with another b/c, beyond both standard deviations, nothing is valid.
+Neither a preload nor a sensor that drifts is part of the model, and yet a motion under one can be fitted to the noise,
+with b/c off by half. So the motions are fitted again with each beside the model. Where that explains them as well, with
+another b/c or, of a drift, k/c, beyond both standard deviations, nothing is valid. What a drift would change makes
+every estimate less sure, beyond the deviation with which that is known:
+
+    var += max(0, (θ - θ_drift)^2 - var_drift)
 
 Break-away: F_s/A lies between the largest force at which the stem rested and the force at which it left,
 both u + (b/c) x in the direction of the motion. A held pressure jumps from one to the other; several events leave what
@@ -44,7 +47,7 @@ from positioner.estimation.breakaway_force import from_interval, intersection, w
 from positioner.estimation.estimates import Directions, Estimate, Estimates, no_estimate, no_estimates
 from positioner.estimation.likelihood import LikelihoodFit, fit_motions
 from positioner.estimation.linear_problem import Prior
-from positioner.estimation.motion_preparation import CLEAR
+from positioner.estimation.motion_preparation import CLEAR, Beside
 from positioner.estimation.motion_segment import MotionSegment
 from positioner.estimation.record_consistency import contradicts
 from positioner.estimation.segmentation import Segmentation, find_motions, whole_stretch
@@ -72,8 +75,6 @@ DECISIVE = log(1000.0)
 """Logarithm of how much likelier a fit must be than another."""
 FINEST_M = 1e-12
 """Of residuals: what is smaller is rounding."""
-AS_WELL = 1.1
-"""Ratio of the residuals up to which another model explains a motion as well."""
 APART = 3.0
 """Standard deviations beyond which two values of b/c are different ones."""
 ENOUGH_FOR_WHITE = 60
@@ -119,7 +120,8 @@ class BatchResult(Brief):
         segments: how many motions were fitted.
         left_out: how many were found and not fitted.
         condition: of the information matrix of (ln τ, ln μ, ln g, ln q), scaled to a unit diagonal.
-        contradicted: whether the rest of the record contradicts the fit.
+        contradicted: whether the rest of the record, or another fit to it, contradicts the fit.
+        open_share: (6,), of θ, by which it hangs on how the pressure goes between samples and on a drift.
     """
 
     estimates: Estimates
@@ -132,6 +134,7 @@ class BatchResult(Brief):
     condition: float
     sampling: Sampling = Sampling.UNKNOWN
     contradicted: bool = False
+    open_share: Array | None = None
 
 
 def identify(
@@ -169,10 +172,15 @@ def identify(
         return BatchResult(nothing, None, best.interpolation, False, noise_std_m, 0, best.segmentation.too_short, nan)
     others = [each.fit for each in hypotheses if each.interpolation != best.interpolation]
     told_apart = all(_clearly_better(best.fit, each) for each in others)
-    open_std = _open_std(best.fit, others) if settings.sampling else np.zeros(6)
+    drifting = _fitted_beside(best, Beside.DRIFT, prior)
+    as_likely = [each for each in others if settings.sampling and not _clearly_better(best.fit, each)]
+    open_std = _open_std(best.fit, [*as_likely, drifting])
     stamps_s = even_s if best.evened and even_s is not None else t
     contradicted = _contradicted(best, stamps_s, x, noise_std_m, settings)
-    estimates = _estimates(best, noise_std_m, settings, float(t[-1]), open_std, contradicted=contradicted)
+    together = _refusal_of_all(best, drifting, noise_std_m, settings)
+    if contradicted and together is Refusal.VALID:
+        together = Refusal.MODEL_DOES_NOT_FIT
+    estimates = _estimates(best, settings, float(t[-1]), open_std, together)
     return BatchResult(
         estimates=replace(estimates, breakaway=_breakaway(best, estimates, settings.largest_relative_std)),
         fit=best.fit,
@@ -183,10 +191,12 @@ def identify(
         left_out=best.segmentation.too_short + len(best.segmentation.segments) - len(best.chosen),
         condition=condition(best.fit),
         sampling=_SAMPLING[best.interpolation] if settings.sampling and told_apart else Sampling.UNKNOWN,
-        contradicted=contradicted,
+        contradicted=contradicted or together in _EXPLAINED_OTHERWISE,
+        open_share=open_std / np.abs(best.fit.theta),
     )
 
 
+_EXPLAINED_OTHERWISE = (Refusal.PRELOAD_EXPLAINS_AS_WELL, Refusal.DRIFT_EXPLAINS_AS_WELL)
 _SAMPLING = {"held": Sampling.BEFORE, "held ahead": Sampling.AFTER, "linear": Sampling.UNKNOWN}
 
 
@@ -207,12 +217,12 @@ def _clearly_better(one: LikelihoodFit | None, other: LikelihoodFit | None) -> b
 
 
 def _open_std(fit: LikelihoodFit, others: list[LikelihoodFit | None]) -> Array:
-    """Return by how much θ is open, (6,), where fits that are as likely have another beyond their own deviation."""
+    """Return by how much θ is open, (6,), to first order: other fits have another, beyond their own deviation."""
     variance = np.zeros(6)
     for each in others:
-        if each is not None and not _clearly_better(fit, each):
-            apart = (each.theta - fit.theta) ** 2 - np.abs(np.diag(each.theta_covariance))
-            variance = np.maximum(variance, apart)
+        if each is not None:
+            own = _widening(each) * np.diag(fit.gradient @ each.covariance @ fit.gradient.T)
+            variance = np.maximum(variance, (fit.gradient @ (each.p - fit.p)) ** 2 - own)
     return np.asarray(np.sqrt(np.maximum(variance, 0.0)))
 
 
@@ -294,18 +304,45 @@ def _is_white(fit: LikelihoodFit) -> bool:
     return fit.count >= ENOUGH_FOR_WHITE and abs(fit.correlation) <= SIGNIFICANT
 
 
-def _preload_explains_as_well(best: _Hypothesis, noise_std_m: float | None, settings: BatchSettings) -> bool:
-    """Return whether a force of one direction beside friction explains motions both ways as well, with another b/c."""
-    if best.fit is None or len({each.direction for each in best.chosen}) < 2:
+def _refusal_of_all(
+    best: _Hypothesis,
+    drifting: LikelihoodFit | None,
+    noise_std_m: float | None,
+    settings: BatchSettings,
+) -> Refusal:
+    """Return why nothing of a fit is valid: it is none, or something beside the model explains the motions as well."""
+    if _explains_otherwise(best, drifting, (2, 3), noise_std_m, settings):
+        return Refusal.DRIFT_EXPLAINS_AS_WELL
+    if _does_not_fit(best, noise_std_m, settings):
+        return Refusal.MODEL_DOES_NOT_FIT
+    both_ways = len({each.direction for each in best.chosen}) > 1
+    pushed = _fitted_beside(best, Beside.PRELOAD, None) if both_ways else None
+    if _explains_otherwise(best, pushed, (2,), noise_std_m, settings):
+        return Refusal.PRELOAD_EXPLAINS_AS_WELL
+    return Refusal.VALID
+
+
+def _fitted_beside(best: _Hypothesis, beside: Beside, prior: Prior | None) -> LikelihoodFit | None:
+    """Return the fit of the same motions, from no start of theirs, with something beside the model."""
+    return fit_motions(list(best.chosen), held=best.interpolation != "linear", prior=prior, beside=beside)
+
+
+def _explains_otherwise(
+    best: _Hypothesis,
+    again: LikelihoodFit | None,
+    numbers: tuple[int, ...],
+    noise_std_m: float | None,
+    settings: BatchSettings,
+) -> bool:
+    """Return whether another fit explains the motions as well, with one of these numbers of p another."""
+    fit = best.fit
+    if fit is None or again is None:
         return False
-    again = fit_motions(list(best.chosen), held=best.interpolation != "linear", lopsided=True)
-    if again is None or again.residual_std_m > max(
-        AS_WELL * best.fit.residual_std_m, _allowed_m(best, noise_std_m, settings)
-    ):
+    if again.residual_std_m > _allowed_m(best, noise_std_m, settings):
         return False
-    std = sqrt(float(best.fit.covariance[2, 2]) + float(again.covariance[2, 2]))
-    apart = abs(float(again.p[2] - best.fit.p[2]))
-    return apart > max(APART * std, settings.largest_relative_std * abs(float(best.fit.p[2])))
+    std = np.sqrt(np.diag(fit.covariance) + _widening(again) * np.diag(again.covariance))
+    beyond = np.abs(again.p - fit.p) > np.maximum(APART * std, settings.largest_relative_std * np.abs(fit.p))
+    return bool(beyond[list(numbers)].any())
 
 
 def _contradicted(
@@ -372,26 +409,13 @@ def condition(fit: LikelihoodFit) -> float:
 
 
 def _estimates(
-    best: _Hypothesis,
-    noise_std_m: float | None,
-    settings: BatchSettings,
-    time_s: float,
-    open_std: Array,
-    *,
-    contradicted: bool,
+    best: _Hypothesis, settings: BatchSettings, time_s: float, open_std: Array, together: Refusal
 ) -> Estimates:
-    """Return the estimates of a fit, each valid or with the reason why not."""
+    """Return the estimates of a fit, each valid or with the reason why not: that of all together, or its own."""
     assert best.fit is not None
     fit = _widened(best.fit, settings)
     values, std = fit.theta.tolist(), np.hypot(np.sqrt(np.abs(np.diag(fit.theta_covariance))), open_std).tolist()
     singly = _refusal_of_each(best, fit, settings.largest_relative_std)
-    together = Refusal.VALID
-    if _does_not_fit(best, noise_std_m, settings):
-        together = Refusal.MODEL_DOES_NOT_FIT
-    elif _preload_explains_as_well(best, noise_std_m, settings):
-        together = Refusal.PRELOAD_EXPLAINS_AS_WELL
-    elif contradicted:
-        together = Refusal.MODEL_DOES_NOT_FIT
     unphysical = (
         values[0] > 0 and Refusal.A_POSITIVE,
         values[1] >= 0 and Refusal.B_NOT_NEGATIVE,

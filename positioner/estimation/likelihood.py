@@ -21,7 +21,7 @@ from config.results.result import Brief
 from positioner.estimation.array import Array
 from positioner.estimation.likelihood_search import gauss_newton, grid_search, with_start_in_gap
 from positioner.estimation.linear_problem import Prior, linear_problem, sensitivities, started
-from positioner.estimation.motion_preparation import PreparedMotion, prepared
+from positioner.estimation.motion_preparation import Beside, PreparedMotion, prepared
 from positioner.estimation.motion_segment import MotionSegment
 
 
@@ -61,9 +61,14 @@ class LikelihoodFit(Brief):
     @property
     def theta_covariance(self) -> Array:
         """Return the covariance of `theta`, (6, 6), to first order, in the products of its units."""
+        return np.asarray(self.gradient @ self.covariance @ self.gradient.T)
+
+    @property
+    def gradient(self) -> Array:
+        """Return the derivatives of `theta` by p, (6, 4)."""
         a, b, c, k, slope, friction = self.theta.tolist()
         g = float(self.p[2])
-        gradient = np.array(
+        return np.array(
             [
                 [a, -a, 0.0, 0.0],
                 [0.0, -b, 0.0, 0.0],
@@ -73,7 +78,6 @@ class LikelihoodFit(Brief):
                 [0.0, 0.0, -friction / g, 1 / g],
             ]
         )
-        return np.asarray(gradient @ self.covariance @ gradient.T)
 
 
 def fit_motions(
@@ -83,7 +87,7 @@ def fit_motions(
     guess: Array | None = None,
     prior: Prior | None = None,
     near: Array | None = None,
-    lopsided: bool = False,
+    beside: Beside = Beside.NOTHING,
 ) -> LikelihoodFit | None:
     """Fit all motions together, at the minimum of S(p) at the head of this module.
 
@@ -93,12 +97,12 @@ def fit_motions(
         guess: (2,), ln τ and ln μ, τ in s and μ in s^2, to start from beside those of the grid.
         prior: what is known beforehand.
         near: (2,), ln τ and ln μ near enough to need no search.
-        lopsided: whether a force of one direction may act beside friction.
+        beside: what may act beside the model.
 
     Returns:
         The fit; None when the samples are fewer than the unknowns, or carry no motion.
     """
-    motions = [prepared(each, held=held, lopsided=lopsided) for each in segments]
+    motions = [prepared(each, held=held, beside=beside) for each in segments]
     if sum(len(each.position_m) for each in motions) < 6 + 2 * len(motions):
         return None
     start = near if near is not None else grid_search(motions, guess, prior)

@@ -2,8 +2,13 @@
 
 For given p = (ln τ, ln μ, starts) the model y_i = g X_g + q X_q + x_0 X_0 + v_0 X_1 (`stem_response`) is linear in g, q
 and in every motion's beginning. The columns of all motions stand in one matrix, g and q shared; a prior is four more
-rows; a force of one direction, where it is allowed, is one more column, σ X_q, shared by all. The derivatives by p
-are differences.
+rows; what may act beside the model is one more column, shared by all. A force of one direction shifts the rest that the
+stem is drawn to; a sensor that drifts shifts what is shown, and by what it had drifted when a motion began, the rest:
+
+    preload   σ X_q
+    drift     (t - t_b) + (t_b - t_0) σ X_q      t_b where a motion begins, t_0 where the first does; σ X_q = 1 - X_0
+
+The derivatives by p are differences.
 """
 
 from dataclasses import dataclass
@@ -12,7 +17,7 @@ from math import exp
 import numpy as np
 
 from positioner.estimation.array import Array
-from positioner.estimation.motion_preparation import PreparedMotion
+from positioner.estimation.motion_preparation import Beside, PreparedMotion
 from positioner.estimation.stem_response import responses
 
 DEGENERATE = 1e-8
@@ -61,16 +66,20 @@ def linear_problem(motions: list[PreparedMotion], p: Array, prior: Prior | None)
     blocks = [_columns(each, p) for each in started(motions, p)]
     starts = [each.start_interval for each in motions if each.start_interval is not None]
     rows = sum(len(each) for each in blocks) + len(starts) + (4 if prior is not None else 0)
-    lopsided = motions[0].lopsided
-    columns: Array = np.zeros((rows, 2 + sum(each.shape[1] - 2 for each in blocks) + lopsided))
+    beside = motions[0].beside
+    columns: Array = np.zeros((rows, 2 + sum(each.shape[1] - 2 for each in blocks) + (beside is not Beside.NOTHING)))
     measured: Array = np.zeros(rows)
     row, column = 0, 2
     for motion, block in zip(motions, blocks, strict=True):
         height, width = len(block), block.shape[1]
         columns[row : row + height, :2] = block[..., :2]
         columns[row : row + height, column : column + width - 2] = block[..., 2:]
-        if lopsided:
+        if beside is not Beside.NOTHING:
             columns[row : row + height, -1] = motion.direction * block[..., 1]
+        if beside is Beside.DRIFT:
+            begun_s = motion.time_s[0]
+            columns[row : row + height, -1] *= begun_s - motions[0].time_s[0]
+            columns[row : row + height - 1, -1] += (motion.time_s[1:] - begun_s) * motion.weight
         measured[row : row + height] = _measured_rows(motion)
         row, column = row + height, column + width - 2
     for start, share in zip(starts, p[2:].tolist(), strict=True):

@@ -8,6 +8,7 @@ and v_0 are free.
 """
 
 from dataclasses import dataclass, replace
+from enum import Enum, auto
 from math import inf, nextafter
 
 import numpy as np
@@ -21,6 +22,14 @@ START_ROWS = 300
 """Rows of the search for a start, in blocks that grow from the beginning, where m and F_v are separated."""
 CLEAR = 0.05
 """A jump of the pressure stands out when every other near it is a smaller share of it."""
+
+
+class Beside(Enum):
+    """What may act beside the model: a force of one direction, as a preload; a sensor that drifts, linear in time."""
+
+    NOTHING = auto()
+    PRELOAD = auto()
+    DRIFT = auto()
 
 
 @dataclass(frozen=True, slots=True)
@@ -38,7 +47,7 @@ class PreparedMotion:
         free_velocity: whether position and velocity at the start are unknown.
         held: how the pressure goes between the rows.
         start_interval: where the start is unknown; None: `time_s[0]`.
-        lopsided: whether a force that has one direction, as a preload has, may act beside friction.
+        beside: what may act beside the model.
     """
 
     direction: int
@@ -51,7 +60,7 @@ class PreparedMotion:
     free_velocity: bool
     held: bool
     start_interval: "StartInterval | None" = None
-    lopsided: bool = False
+    beside: Beside = Beside.NOTHING
 
 
 @dataclass(frozen=True, slots=True)
@@ -74,7 +83,7 @@ class StartInterval:
         return replace(motion, time_s=time_s)
 
 
-def prepared(segment: MotionSegment, *, held: bool, lopsided: bool = False) -> PreparedMotion:
+def prepared(segment: MotionSegment, *, held: bool, beside: Beside = Beside.NOTHING) -> PreparedMotion:
     """Return the rows of a motion, from the jump of a held pressure that began it, or from where it surely moves."""
     jump = _initial_jump(segment, held)
     from_rest = jump is not None
@@ -106,7 +115,7 @@ def prepared(segment: MotionSegment, *, held: bool, lopsided: bool = False) -> P
         rest_count=count,
         free_velocity=not from_rest,
         held=held,
-        lopsided=lopsided,
+        beside=beside,
     )
 
 

@@ -14,12 +14,13 @@ with the posterior of the moves before it as the prior (`passive`).
 
 from collections import deque
 from dataclasses import dataclass, replace
-from math import inf, isfinite, nan
+from math import hypot, inf, isfinite, nan
 
 import numpy as np
 
 from config.codes import Refusal, Sampling
 from positioner.estimation.algebraic import Identifier
+from positioner.estimation.array import Array
 from positioner.estimation.batch import BatchResult, BatchSettings
 from positioner.estimation.breakaway_force import after_event, with_validity
 from positioner.estimation.derivatives import Derivatives
@@ -281,8 +282,26 @@ class Identification:
             # late, stays well below.
             gross_m = GROSS * self._settings.stroke_m
             gross = result.fit is not None and result.fit.residual_std_m > gross_m
-            refused = self._sampling is not self._settings.sampling or (not fits and (gross or result.contradicted))
-            self.estimates = refined if refused else replace(self.estimates, progress=1.0)
+            less_sure = self._less_sure(result.open_share)
+            refused = self._sampling is not self._settings.sampling or result.contradicted or (not fits and gross)
+            refused = refused or (self.estimates.acceptable and not less_sure.acceptable)
+            self.estimates = refined if refused else replace(less_sure, progress=1.0)
+
+    def _less_sure(self, open_share: Array | None) -> Estimates:
+        """Return the estimates, b/c and k/c known to no better than shares, those of a fit, say they are."""
+        if open_share is None:
+            return self.estimates
+        slope, friction = self.estimates.b_over_c, self.estimates.k_over_c
+        slope, friction = self._known_to(slope, open_share[4]), self._known_to(friction, open_share[5])
+        return replace(self.estimates, b_over_c=slope, k_over_c=friction)
+
+    def _known_to(self, each: Estimate, share: float) -> Estimate:
+        """Return an estimate of which a share is open."""
+        if not each.valid:
+            return each
+        std = hypot(each.std, share * each.value)
+        unsure = not std <= self._settings.largest_relative_std * abs(each.value)
+        return replace(each, std=std, reason=Refusal.TOO_UNCERTAIN if unsure else Refusal.VALID)
 
     def _request(self, parameters: bool, friction: bool) -> None:
         self._requested = (parameters, friction)

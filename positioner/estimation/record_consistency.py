@@ -20,8 +20,8 @@ be what a rest leads to, in direction s, but for what lateness leaves open:
 A stem with Coulomb friction cannot turn round without a rest, unless the pressure falls by 2 F_c meanwhile, and then
 the response ends there.
 
-A drift cannot be told from a slow sine but by the first milliseconds, whose instants lateness leaves open; nor can a
-jump that is smaller than x' L there.
+A jump that is smaller than x' L in the first milliseconds cannot be told. A drift is no matter of single samples:
+`batch` fits it beside the model.
 """
 
 from dataclasses import replace

@@ -29,7 +29,7 @@ DEVIATIONS, NEAR = 3.0, 2e-3
 
 @dataclass
 class Spoiled:
-    """A sensor that fails in one way from a time on: by a share of the stroke, or for a time, s."""
+    """A sensor that fails in one way from a time on: by a share of the stroke, a rate of it, 1/s, or for a time, s."""
 
     kind: str
     by: float
@@ -43,6 +43,8 @@ class Spoiled:
         since_s = time_s - self.at_s
         if self.kind == "jump":
             return shown_m + self.by * STROKE_M
+        if self.kind == "drift":
+            return shown_m + self.by * STROKE_M * since_s
         if self.kind == "spike":
             return shown_m + self.by * STROKE_M * (since_s < 3 * PERIOD_S)
         return self._held_m if since_s < self.by else shown_m
@@ -93,16 +95,20 @@ def assert_nothing_wrong(decision: Decision) -> None:
 
 AT_S = (0.105, 0.115, 0.13, 0.2, 0.4, 0.6, 0.8)
 SIGNED = [("jump", by) for by in (-0.1, -0.03, 0.03, 0.1)]
+SIGNED += [("drift", by) for by in (-0.05, -0.01, 0.01, 0.05)]
 SIGNED += [("spike", by) for by in (-0.1, 0.01, 0.1)]
 MATRIX = [Spoiled(kind, by, at_s) for (kind, by), at_s in product([*SIGNED, ("freeze", 0.05), ("freeze", 0.2)], AT_S)]
 HARD = [
     Spoiled("jump", -0.1, 0.115),
     Spoiled("jump", -0.03, 0.13),
     Spoiled("jump", 0.03, 0.105),
+    Spoiled("drift", -0.05, 0.105),
+    Spoiled("drift", 0.01, 0.2),
 ]
+SMALL = [Spoiled("drift", by, at_s) for by, at_s in product((-0.004, 0.004, 0.002), (0.0, 0.105, 0.3, 0.6))]
 
 
-@pytest.mark.parametrize("spoiled", few_always([*HARD, *MATRIX], len(HARD)), ids=str)
+@pytest.mark.parametrize("spoiled", few_always([*HARD, *MATRIX, *SMALL], len(HARD)), ids=str)
 def test_nothing_is_applied_beyond_its_deviation_whatever_the_sensor_does(spoiled: Spoiled) -> None:
     assert_nothing_wrong(identified(spoiled))
 
