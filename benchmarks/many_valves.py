@@ -5,9 +5,9 @@
 The devices are one process, which answers the shipped map from words that count up, so that nearly all that is used of
 the processors is the daemon's. Figures: periods missed, per cent; processor time a cycle, us, and how many times that
 of one on a device in memory, by which `doctor` says how many valves fit; the share of one processor that the daemon
-took, whose interpreter can use one; and what all others on the machine took meanwhile, the devices among them, in
-processors. Where that is much, periods are missed by it, and a cycle is dearer, whose caches are not its own. Each
-valve is in mode hold: the cost of standing by.
+took with its workers; and what all others on the machine took meanwhile, the devices among them, in processors. Where
+that is much, periods are missed by it, and a cycle is dearer, whose caches are not its own. Each valve is in mode
+hold: the cost of standing by.
 """
 
 import argparse
@@ -138,7 +138,7 @@ def measured(valves: int, rate_hz: float, seconds: float) -> str:
         time.sleep(seconds)
         after, used_s, took_s = _seen(port, units), _used_s(process) - used_s, time.monotonic() - begun_s
         all_s = _machine_s() - all_s
-        threads = process.num_threads()
+        threads = sum(each.num_threads() for each in (process, *process.children(recursive=True)))
         told_s = time.monotonic()
         daemon.send_signal(signal.SIGTERM)
         daemon.wait(60.0)
@@ -173,8 +173,9 @@ def _seen(port: int, units: Sequence[int]) -> list[dict[str, float]]:
 
 
 def _used_s(process: psutil.Process) -> float:
-    times = process.cpu_times()
-    return float(times.user + times.system)
+    """Return the processor time that a process and those that it has started have used, s."""
+    times = [each.cpu_times() for each in (process, *process.children(recursive=True))]
+    return float(sum(each.user + each.system for each in times))
 
 
 def _machine_s() -> float:

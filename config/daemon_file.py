@@ -305,6 +305,13 @@ class LogTable(Schema):
     level: Literal["debug", "info", "warning", "error"] = "info"
 
 
+class ServiceTable(Schema):
+    """Table `[service]`: the processes of the daemon."""
+
+    processes: Annotated[int, Field(ge=1, le=64)] | None = None
+    """Among which the valves are shared; where nobody says, as few as their cycles need, at most one a processor."""
+
+
 class DaemonFile(Schema):
     """A whole daemon file."""
 
@@ -327,6 +334,7 @@ class DaemonFile(Schema):
     memory: MemoryTable = MemoryTable()
     history: HistoryTable | None = None
     log: LogTable = LogTable()
+    service: ServiceTable = ServiceTable()
 
     @model_validator(mode="after")
     def _safe_pressure_is_known(self) -> Self:
@@ -385,7 +393,7 @@ class DaemonFile(Schema):
         return asked == "staircase"
 
 
-SHARED = frozenset({"supervisory", "history", "log"})
+SHARED = frozenset({"supervisory", "history", "log", "service"})
 """Tables that the valves of a daemon have together."""
 OWN = frozenset(DaemonFile.model_fields) - SHARED - {"valve"}
 """Tables that each valve of several may have for itself."""

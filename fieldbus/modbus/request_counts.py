@@ -1,5 +1,6 @@
 """How many requests a server got, by who asked: a role of Modbus/TCP Security, or anybody in the clear."""
 
+from collections.abc import Mapping
 from threading import Lock
 
 from config.registers import REQUESTERS
@@ -24,6 +25,15 @@ class RequestCounts:
     def of(self, requester: str) -> int:
         """Return how many there were of one of `REQUESTERS`."""
         return self._counts[requester]
+
+    @property
+    def all(self) -> dict[str, int]:
+        """All of them."""
+        return dict(self._counts)
+
+    def take(self, counts: Mapping[str, int]) -> None:
+        """Have those that another process has counted."""
+        self._counts.update(counts)
 
     def _count(self, requester: str) -> None:
         with self._lock:

@@ -3,7 +3,9 @@
 One blocking thread owns the driver and runs `cycle`; the supervisory server and the recorder have threads of their
 own. They meet only in immutable snapshots that are replaced whole: the cycle waits for nobody.
 
-    service, ending               assembles it from its file, starts and ends it; what ends it
+    service, ending               starts and ends it; what ends it
+    assembled_valves              its valves from their files, or some of them, with all that runs for them
+    workers                       processes that share them, where one processor is too little
     cycle, pacing, link           one cycle, when it begins, and the driver with its connection
     cycle_load                    what the cycles of all valves cost, and how many fit
     first_look                    whether a device's numbers can be what the file takes them for

@@ -2,13 +2,16 @@
 
     load = sum of c/T over the valves        c processor time of a cycle, T its period
 
-An interpreter uses one processor, however many there are: all cycles of a daemon share it. c is that of the daemon's
-own cycle on a device in memory, which answers at once, times `ON_THE_WIRE`.
+An interpreter uses one processor, however many there are: a daemon whose cycles need more shares its valves among
+processes, at most one a processor where its file says no number. c is that of the daemon's own cycle on a device in
+memory, which answers at once, times `ON_THE_WIRE`.
 """
 
+import os
 import time
 from collections.abc import Sequence
 from dataclasses import dataclass
+from math import ceil
 
 from config.daemon_file import DaemonFile
 from drivers.in_memory import MemoryDriver
@@ -32,39 +35,46 @@ BATCHES, CYCLES = 6, 40
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class CycleLoad:
-    """What valves need of one processor.
+    """What valves need of the processors.
 
     Attributes:
         valves: number of them that cycle in real time.
         fastest_s: the shortest period among them.
         cost_s: processor time of a cycle.
-        share: of the processor; 1 is all of it.
+        share: of one processor; 1 is all of it.
+        processes: that may share them, each with a processor of its own.
     """
 
     valves: int
     fastest_s: float
     cost_s: float
     share: float
+    processes: int = 1
 
     @property
     def most(self) -> int:
         """How many such valves fit."""
-        return int(USABLE * self.valves / self.share) if self.share else self.valves
+        return int(USABLE * self.processes * self.valves / self.share) if self.share else self.valves
 
     @property
     def fits(self) -> bool:
         """Whether all do."""
-        return self.share <= USABLE
+        return self.share <= USABLE * self.processes
+
+    @property
+    def needed(self) -> int:
+        """How many processes they need, of those that there may be."""
+        return min(max(ceil(self.share / USABLE), 1), self.processes)
 
     @property
     def said(self) -> str:
         """All of it in a line; the key with which it is mended where they do not fit."""
         who = "1 valve needs" if self.valves == 1 else f"{self.valves} valves need"
         line = (
-            f"{who} {100 * self.share:.0f} % of the one processor that a daemon uses, at {1e3 * self.fastest_s:g} ms "
-            f"and {1e6 * self.cost_s:.0f} us a cycle; at most {self.most} fit"
+            f"{who} {100 * self.share:.0f} % of a processor, at {1e3 * self.fastest_s:g} ms and "
+            f"{1e6 * self.cost_s:.0f} us a cycle; at most {self.most} fit on {self.processes}"
         )
-        return line if self.fits else f"{line}: a longer cycle.period_s, or several daemons"
+        return line if self.fits else f"{line}: a longer cycle.period_s, or fewer valves"
 
 
 def cycle_load(files: Sequence[DaemonFile], cost_s: float | None = None) -> CycleLoad | None:
@@ -79,7 +89,18 @@ def cycle_load(files: Sequence[DaemonFile], cost_s: float | None = None) -> Cycl
         return None
     cost_s = cycle_cost_s(files[0]) if cost_s is None else cost_s
     share = sum(cost_s / each for each in periods_s)
-    return CycleLoad(valves=len(periods_s), fastest_s=min(periods_s), cost_s=cost_s, share=share)
+    return CycleLoad(
+        valves=len(periods_s),
+        fastest_s=min(periods_s),
+        cost_s=cost_s,
+        share=share,
+        processes=min(files[0].service.processes or processors(), processors()),
+    )
+
+
+def processors() -> int:
+    """Return how many processors this process may use."""
+    return len(os.sched_getaffinity(0)) if hasattr(os, "sched_getaffinity") else os.cpu_count() or 1
 
 
 def cycle_cost_s(file: DaemonFile) -> float:

@@ -28,6 +28,7 @@ class Endings:
     def __init__(self) -> None:
         # A list, not an Event: a handler that sets one may deadlock with the wait it interrupts.
         self._signals: list[int] = []
+        self._told: list[str] = []
         self._dead: list[str] = []
         for number in ENDING:
             if number in ALWAYS or signal.getsignal(number) is not signal.SIG_IGN:  # as nohup has it
@@ -39,7 +40,16 @@ class Endings:
     @property
     def came(self) -> bool:
         """Whether it is to end."""
-        return bool(self._signals or self._dead)
+        return bool(self._signals or self._dead or self._told)
+
+    def tell(self, reason: str) -> None:
+        """Have it end for a reason of its own. Called by any thread."""
+        self._told.append(reason)
+
+    @property
+    def signal(self) -> int:
+        """The signal that ended it, SIGTERM where there was none: by it others are told to end."""
+        return self._signals[0] if self._signals else int(signal.SIGTERM)
 
     @property
     def status(self) -> int:
@@ -50,7 +60,7 @@ class Endings:
     def reason(self) -> str:
         """What ended it."""
         signals = (signal.strsignal(number) or str(number) for number in self._signals)
-        return ", ".join((*self._dead, *signals))
+        return ", ".join((*self._dead, *self._told, *signals))
 
     def _note_death(self, died: threading.ExceptHookArgs) -> None:
         name = died.thread.name if died.thread is not None else "a thread"

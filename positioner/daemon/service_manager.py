@@ -19,6 +19,25 @@ LEAST_TURNS = 3
 """Turns of the slowest loop within it."""
 
 
+class Turns:
+    """Whether all loops have turned since they were last found to have, looked at so often; s."""
+
+    def __init__(self, every_s: float) -> None:
+        self.every_s = every_s
+        self.found_s = 0.0
+        self._counts: tuple[int, ...] = ()
+
+    def all_have(self, counts: Sequence[int], now_s: float) -> bool:
+        """Return whether it is time, and the count of each loop has changed."""
+        if now_s - self.found_s < self.every_s:
+            return False
+        before = self._counts
+        if len(counts) == len(before) and any(now == then for now, then in zip(counts, before, strict=True)):
+            return False
+        self._counts, self.found_s = tuple(counts), now_s
+        return True
+
+
 class ServiceManager:
     """The other end, if there is one.
 
@@ -33,8 +52,7 @@ class ServiceManager:
         self._address = environment.get("NOTIFY_SOCKET", "")
         self._watchdog_s = _watchdog_s(environment) if self._address else 0.0
         self._now_s = now_s
-        self._fed_s = 0.0
-        self._turns: tuple[int, ...] = ()
+        self._turns = Turns(self._watchdog_s / FEEDS)
 
     def ready(self, slowest_s: float, said: str) -> None:
         """Say that it serves, and how; its slowest loop takes so long for a cycle at the most."""
@@ -42,18 +60,13 @@ class ServiceManager:
         if 0.0 < self._watchdog_s < LEAST_TURNS * slowest_s:
             self._watchdog_s = LEAST_TURNS * slowest_s
             lines.append(f"WATCHDOG_USEC={round(self._watchdog_s * 1e6)}")
-        self._fed_s = self._now_s()
+        self._turns.every_s, self._turns.found_s = self._watchdog_s / FEEDS, self._now_s()
         self._tell(lines)
 
     def feed(self, turns: Sequence[int]) -> None:
         """Feed the watchdog if it is time and each loop's count of turns has changed since the last time."""
-        now_s = self._now_s()
-        if not self._watchdog_s or now_s - self._fed_s < self._watchdog_s / FEEDS:
-            return
-        if len(turns) == len(self._turns) and any(now == then for now, then in zip(turns, self._turns, strict=True)):
-            return
-        self._turns, self._fed_s = tuple(turns), now_s
-        self._tell(["WATCHDOG=1"])
+        if self._watchdog_s and self._turns.all_have(turns, self._now_s()):
+            self._tell(["WATCHDOG=1"])
 
     def stopping(self, reason: str) -> None:
         """Say that it ends, and why."""

@@ -42,24 +42,32 @@ class HistoryFull(OSError):
 
 
 class HistoryFile:
-    """The writer; one for a file.
+    """The writer; one for a file, save that processes of one daemon write beside each other, each of its own valves.
 
     Args:
         folder: where it is, made if need be.
         keep_days: rows older than this go.
         limit_mb: of the file and its log together, MB.
+        beside_another: whether another process of the same daemon has it, and has found it sound.
 
     Raises:
         InputError: the folder cannot be written, another daemon writes there, the file is another program's or
             another version's.
     """
 
-    def __init__(self, folder: Path, keep_days: float, limit_mb: int) -> None:
+    def __init__(self, folder: Path, keep_days: float, limit_mb: int, *, beside_another: bool = False) -> None:
         self.path = folder / FILE_NAME
         self.set_aside: str | None = None
         """Why the file that was there could not be used, and what it is called now."""
         self._keep_s = keep_days * SECONDS_A_DAY
         self._limit_bytes = limit_mb * 1_000_000
+        self._lock: int | None = None
+        if beside_another:
+            try:
+                self._connection = _connected(self.path)
+            except sqlite3.Error as error:
+                raise InputError(str(self.path), f"the history cannot be kept there: {error}") from None
+            return
         try:
             folder.mkdir(parents=True, exist_ok=True)
             self._lock = locked(folder / f"{FILE_NAME}.lock", "another daemon keeps its history there")
@@ -128,7 +136,8 @@ class HistoryFile:
         """Close the file, its log merged into it."""
         with suppress(sqlite3.Error):  # on a full disk the log stays beside it, and is as good
             self._connection.close()
-        os.close(self._lock)
+        if self._lock is not None:
+            os.close(self._lock)
 
     @contextmanager
     def _changing(self, *, in_one: bool = True) -> Iterator[None]:

@@ -4,8 +4,9 @@ from pathlib import Path
 
 import pytest
 
-from config.daemon_file import DaemonFile, load_valves
+from config.daemon_file import DaemonFile, ServiceTable, load_valves
 from positioner.cli.main import main
+from positioner.daemon import cycle_load as module
 from positioner.daemon.cycle_load import ON_THE_WIRE, USABLE, cycle_load, in_memory_s
 
 
@@ -36,6 +37,26 @@ def test_loads_add_up_and_as_many_fit_as_are_said_to() -> None:
     assert cycle_load([file(0.01, "device")]) is None
 
 
+@pytest.mark.parametrize(
+    ("cost_s", "asked", "needed", "fits"),
+    [
+        (1e-3, None, 1, True),
+        (9e-3, None, 2, True),
+        (30e-3, None, 4, True),
+        (90e-3, None, 4, False),
+        (9e-3, 1, 1, False),
+    ],
+)
+def test_as_many_processes_as_the_cycles_need_and_no_more_than_processors(
+    cost_s: float, asked: int | None, needed: int, *, fits: bool, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setattr(module, "processors", lambda: 4)
+    one = file(0.01).model_copy(update={"service": ServiceTable(processes=asked)})
+    load = cycle_load([one], cost_s=cost_s)
+    assert load is not None
+    assert (load.needed, load.fits) == (needed, fits)
+
+
 def test_a_cycle_on_this_machine_takes_some_ten_microseconds_to_a_millisecond_in_memory() -> None:
     cost_s = in_memory_s(file(0.01))
     assert 5e-6 < cost_s < 2e-3
@@ -45,12 +66,15 @@ def test_a_cycle_on_this_machine_takes_some_ten_microseconds_to_a_millisecond_in
     assert 0.25 < load.cost_s / cost_s / ON_THE_WIRE < 4.0
 
 
-def test_more_valves_than_any_machine_runs_are_refused(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+def test_more_valves_than_any_machine_runs_are_refused(
+    tmp_path: Path, capsys: pytest.CaptureFixture[str], monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setattr(module, "processors", lambda: 2)
     path = fleet(tmp_path, valves=64, period_s=1e-3)
     load = cycle_load(load_valves(path))
     assert load is not None
     assert load.most < 64
-    assert load.share > USABLE
+    assert load.share > 2 * USABLE
     assert main(["run", str(path)]) == 2
     said = capsys.readouterr().err
     assert "64 valves need" in said

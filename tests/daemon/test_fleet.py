@@ -40,6 +40,7 @@ from positioner.dcs import Dcs, DcsError
 from sim.slave.clocks import Lockstep
 from sim.slave.device_registers import DeviceRegisters
 from sim.slave.modbus_slave import device_of
+from sim.slave.simulated_device import Device
 from tests.children import running
 
 pytestmark = pytest.mark.real_time
@@ -213,7 +214,7 @@ def test_on_one_serial_line_the_others_lose_nothing_while_one_is_dead_nor_when_i
         devices.stop()
 
 
-# ---- eight valves on Modbus TCP, the daemon a process of its own
+# ---- eight valves on Modbus TCP, the daemon a process of its own, or some that share them
 
 
 @dataclass
@@ -232,25 +233,40 @@ class Site:
             return dcs.get_all(*names)
 
 
-def registers_at(number: int) -> DeviceRegisters:
-    """Return a simulated device in lockstep whose stem is at 10 mm times its number."""
+def simulated_at(number: int) -> Device:
+    """Return a simulated device whose stem is at 10 mm times its number."""
     file = SlaveFile.model_validate(
         {"clock": {"mode": "lockstep"}, "initial": {"position_m": 0.01 * number, "pressure_pa": 8e3 * number}}
     )
-    simulated = device_of(file, shipped_valve("seed"))
+    return device_of(file, shipped_valve("seed"))
+
+
+def registers_at(number: int) -> DeviceRegisters:
+    """Return the registers of such a device in lockstep."""
+    return registers_of(simulated_at(number))
+
+
+def registers_of(simulated: Device) -> DeviceRegisters:
+    """Return a device's registers in lockstep."""
     return DeviceRegisters(simulated, Lockstep(simulated))
 
 
 def device(number: int, port: int = 0) -> RegisterServer:
     """Serve such a device on Modbus TCP."""
-    server = RegisterServer(registers_at(number), "127.0.0.1", port, 1)
+    return served(registers_at(number), port)
+
+
+def served(registers: DeviceRegisters, port: int = 0) -> RegisterServer:
+    """Serve a device on Modbus TCP."""
+    server = RegisterServer(registers, "127.0.0.1", port, 1)
     server.start()
     return server
 
 
-def fleet_file(folder: Path, ports: list[int]) -> Path:
+def fleet_file(folder: Path, ports: list[int], processes: int = 1) -> Path:
     path = folder / "fleet.toml"
     common = (
+        f"[service]\nprocesses = {processes}\n"
         "[device]\nreply_timeout_s = 2.0\n[cycle]\nperiod_s = 0.01\n[supervisory]\nport = 0\n"
         "[recorder]\nfolder = 'recordings'\n[safety]\nstale_after_s = 60.0\n"
     )
@@ -263,9 +279,9 @@ def fleet_file(folder: Path, ports: list[int]) -> Path:
 
 
 @contextmanager
-def fleet(folder: Path, absent: int | None = None) -> Iterator[Site]:
+def fleet(folder: Path, absent: int | None = None, processes: int = 1) -> Iterator[Site]:
     devices = [device(number) for number in range(1, VALVES + 1)]
-    path = fleet_file(folder, [each.port for each in devices])
+    path = fleet_file(folder, [each.port for each in devices], processes)
     if absent is not None:
         devices[absent - 1].stop()
     try:
@@ -278,7 +294,8 @@ def fleet(folder: Path, absent: int | None = None) -> Iterator[Site]:
 
 @pytest.fixture(scope="module")
 def site(tmp_path_factory: pytest.TempPathFactory) -> Iterator[Site]:
-    with fleet(tmp_path_factory.mktemp("fleet")) as here:
+    """All that a daemon of several valves promises holds as well where its processes share them."""
+    with fleet(tmp_path_factory.mktemp("fleet"), processes=3) as here:
         yield here
 
 

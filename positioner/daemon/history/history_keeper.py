@@ -11,7 +11,7 @@ on a clock that is never set; that the gateway's was set is an event.
 import logging
 import time
 from collections import deque
-from collections.abc import Iterable
+from collections.abc import Callable, Iterable
 from dataclasses import replace
 from datetime import UTC, datetime
 from importlib.metadata import version
@@ -56,13 +56,18 @@ class HistoryKeeper:
     Args:
         table: where, how long and how much; None keeps nothing.
         folder: that of the daemon's file.
+        tell: takes writes, where another process of this daemon numbers them; it has opened the file before.
 
     Raises:
         InputError: the history cannot be kept there.
     """
 
-    def __init__(self, table: HistoryTable | None, folder: Path) -> None:
-        self._file = None if table is None else HistoryFile(folder / table.folder, table.keep_days, table.limit_mb)
+    def __init__(self, table: HistoryTable | None, folder: Path, tell: Callable[[Told], None] | None = None) -> None:
+        self._file = None
+        if table is not None:
+            where = folder / table.folder
+            self._file = HistoryFile(where, table.keep_days, table.limit_mb, beside_another=tell is not None)
+        self._tell = tell
         self._valves: list[ValveHistory] = []
         self._waiting: deque[Told | Found] = deque()
         self._offering = Lock()
@@ -111,6 +116,9 @@ class HistoryKeeper:
 
     def offer(self, what: Told | Found) -> None:
         """Take a write, a session or an event if there is room. Not for the cycle's thread."""
+        if self._tell is not None and isinstance(what, Told):
+            self._tell(what)
+            return
         with self._offering:
             if len(self._waiting) < MOST_WAITING:
                 self._waiting.append(what)
