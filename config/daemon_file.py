@@ -18,6 +18,7 @@ from pydantic import AfterValidator, BeforeValidator, Field, IPvAnyNetwork, mode
 from config.alarm_table import AlarmsTable
 from config.bus_plugins import AnyDevice
 from config.device import Host, ModbusDevice, ModbusTcpDevice
+from config.drive import ROTARY, VALVE, Kind, Scale, as_written, in_si
 from config.errors import InputError
 from config.file_kinds import require_kind
 from config.law_names import DEFAULT_LAW, one_of_the_laws
@@ -67,18 +68,14 @@ def _positioned(actuator: object) -> object:
     return actuator
 
 
-def _by_stroke(_: object) -> None:
-    raise ValueError(
-        "a rotary valve is positioned by its actuator: write stroke_m, the travel of the piston, and let the scale of "
-        "device.map.position_m make 0 to stroke_m of its degrees"
-    )
-
-
 class ValveTable(Schema):
     """Table `[valve]`: what the controller must know of the valve before it identifies anything."""
 
     name: Label = "valve"
     stroke_m: Stroke
+    """From end to end; of a rotary valve its travel, rad, which the file has as `travel_deg`."""
+    travel_deg: Annotated[float, Field(ge=1, le=3600)] | None = None
+    """What a rotary valve turns from end to end: a quarter turn is 90."""
     action: ActionWord = "air_to_open"
     """What more air does; openings count from the closed end (`config.travel`)."""
     actuator: Annotated[Literal["spring_return"], BeforeValidator(_positioned)] = "spring_return"
@@ -86,13 +83,41 @@ class ValveTable(Schema):
     breakaway_pa: Pressure | None = None
     """F_s / A where it is known: the excitation's constant part must exceed it."""
 
-    travel_deg: Annotated[None, BeforeValidator(_by_stroke)] = None
-    """What a rotary valve has; refused, with what to write in its place."""
+    @model_validator(mode="before")
+    @classmethod
+    def _turns_or_goes(cls, table: Any) -> Any:
+        if not isinstance(table, dict) or table.get("travel_deg") is None:
+            return table
+        if "stroke_m" in table:
+            raise ValueError("travel_deg is of a valve that turns, stroke_m of one with a stem: allowed is one of them")
+        turned = table["travel_deg"]
+        known = isinstance(turned, int | float) and not isinstance(turned, bool)
+        return table | {"stroke_m": math.radians(turned) if known else 1.0}
+
+    @property
+    def kind(self) -> Kind:
+        """Its names and units: those of a stem, or of what turns."""
+        return VALVE if self.travel_deg is None else ROTARY
+
+    @property
+    def length(self) -> str:
+        """The key that says its travel."""
+        return "stroke_m" if self.travel_deg is None else "travel_deg"
+
+    @property
+    def place(self) -> str:
+        """The key of a device's map that says where the reading of its position is."""
+        return as_written(self.kind, "position_m", 0.0)[0]
+
+    @property
+    def plain(self) -> Scale:
+        """How a position is read in the units of these files: m, or degrees."""
+        return Scale(1.0, "m") if self.travel_deg is None else self.kind.length
 
     @property
     def travel(self) -> Travel:
         """Where the stem stands at which opening."""
-        return Travel.of(self.stroke_m, self.action)
+        return Travel(self.stroke_m, self.action == "air_to_close", self.kind.turns)
 
 
 class CycleTable(Schema):
@@ -423,13 +448,21 @@ def load_valves(path: Path) -> tuple[DaemonFile, ...]:
     tables, source = read_toml(path), str(path)
     require_kind(tables, "daemon", source)
     if not tables.get("valve") or not isinstance(tables["valve"], list):
-        return (validated(DaemonFile, tables, source, path.parent),)
+        return (_validated(tables, source, path.parent),)
     numbered = enumerate(tables["valve"], 1)
     each_valve = (_tables_of_one(tables, entry, f"{source}: valve {number}") for number, entry in numbered)
-    files = tuple(validated(DaemonFile, each, where, path.parent) for each, where in each_valve)
+    files = tuple(_validated(each, where, path.parent) for each, where in each_valve)
     if problem := _conflict(files) or _crowded_line(files):
         raise InputError(source, problem)
     return tuple(_beside_others(file, files) for file in files)
+
+
+def _validated(tables: dict[str, Any], source: str, folder: Path) -> DaemonFile:
+    """Return one valve's file; what a rotary valve has in degrees is in rad inside."""
+    valve = tables.get("valve")
+    if isinstance(valve, dict) and "travel_deg" in valve:
+        tables = {key: table if key == "valve" else in_si(table, source, key) for key, table in tables.items()}
+    return validated(DaemonFile, tables, source, folder)
 
 
 def _tables_of_one(tables: dict[str, Any], entry: Any, where: str) -> tuple[dict[str, Any], str]:

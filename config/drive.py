@@ -10,18 +10,23 @@ holds for all of them. What u, A, x and the force are called, and in which units
     linear motor    A     force_n_per_a        m     N        A, mm, N
     rotary          N m   1                    rad   N m      N m, rad, N m
     rotary motor    A     torque_nm_per_a      rad   N m      A, rad, N m
+    rotary valve    Pa    torque_nm_per_pa     rad   N m      kPa, deg, N m
 
 Inside the program all have a valve's names. A drive's files have its own: the units at the end of a name are the
 drive's, `command_nm` for `command_pa`, `spring_nm_per_rad` for `spring_n_per_m`; a measured `pressure_pa` is `force_n`,
-`torque_nm` or `current_a`.
+`torque_nm` or `current_a`. Files of the plant, the daemon's and the slave's, have a rotary valve's angles in degrees
+(`in_si`); whatever is a measurement or a model is SI.
 """
 
 import re
 from collections.abc import Collection, Mapping
 from dataclasses import dataclass
-from typing import Literal, NamedTuple
+from math import degrees, radians
+from typing import Any, Literal, NamedTuple
 
-KindName = Literal["valve", "linear", "linear motor", "rotary", "rotary motor"]
+from config.errors import InputError
+
+KindName = Literal["valve", "linear", "linear motor", "rotary", "rotary motor", "rotary valve"]
 OF_VALVE = ("per", "s", "kg", "m", "m2", "m3", "n", "ns", "ns2", "ms", "pa")
 """Units at the end of a valve's names."""
 TURNING: Mapping[str, str] = {
@@ -72,6 +77,7 @@ QUANTITIES: Mapping[str, Quantity] = {
     "a": Quantity("current", "A", Scale(1.0, "A")),
     "m": Quantity("position", "m", Scale(1e3, "mm")),
     "rad": Quantity("angle", "rad", Scale(1.0, "rad")),
+    "deg": Quantity("angle", "rad", Scale(degrees(1.0), "deg")),
 }
 """By the unit at the end of a name."""
 
@@ -87,11 +93,13 @@ class Kind:
     """of its position's."""
     area: str = ""
     """What A is called; empty: the command is the force."""
+    read_in: str = ""
+    """The unit in which people read its travel, where that is not its own."""
 
     @property
     def noun(self) -> str:
         """What it is, as a title begins."""
-        return "Valve" if self.name == "valve" else "Drive"
+        return "Valve" if self.name.endswith("valve") else "Drive"
 
     @property
     def turns(self) -> bool:
@@ -106,7 +114,7 @@ class Kind:
     @property
     def travel(self) -> Quantity:
         """What its travel is."""
-        return QUANTITIES[self.moved]
+        return QUANTITIES[self.read_in or self.moved]
 
     @property
     def force(self) -> Quantity:
@@ -174,9 +182,10 @@ KINDS: Mapping[str, Kind] = {
         Kind("linear motor", "a", "m", "force_n_per_a"),
         Kind("rotary", "nm", "rad"),
         Kind("rotary motor", "a", "rad", "torque_nm_per_a"),
+        Kind("rotary valve", "pa", "rad", "torque_nm_per_pa", "deg"),
     )
 }
-VALVE = KINDS["valve"]
+VALVE, ROTARY = KINDS["valve"], KINDS["rotary valve"]
 
 
 def kind_of_columns(names: Collection[str]) -> Kind:
@@ -186,3 +195,73 @@ def kind_of_columns(names: Collection[str]) -> Kind:
         if kind.own("command_pa") in names and moved:
             return kind
     return VALVE
+
+
+IN_DEGREES: Mapping[str, str] = {
+    ROTARY.own(name).replace("rad", "deg"): name
+    for name in (
+        "position_m",
+        "noise_std_m",
+        "quantum_m",
+        "by_m",
+        "b_over_c_pa_per_m",
+        "coulomb_n",
+        "static_n",
+        "viscous_ns_per_m",
+        "spring_n_per_m",
+    )
+}
+"""Names that a rotary valve has in the plant's files, in degrees or as torques, and what they are called inside."""
+WRITTEN: Mapping[str, str] = {name: own for own, name in IN_DEGREES.items()}
+"""The same the other way."""
+SCALED: Mapping[str, float] = {"scale": 1.0, "offset": 0.0}
+"""Of a place in a device's registers, with what stands for it where nobody says."""
+
+
+def in_si(tables: Any, source: str, *path: str) -> Any:
+    """Return the tables of a rotary valve's file with the names and units that are used inside.
+
+    A place in a device's registers keeps its raw numbers: its scale and its offset are what is in degrees.
+
+    Raises:
+        InputError: a name of what has a stem; says what is in its place.
+
+    >>> in_si({"position_deg": {"address": 3, "scale": 90.0}}, "site.toml")
+    {'position_m': {'address': 3, 'scale': 1.5707963267948966, 'offset': 0.0}}
+    """
+    if isinstance(tables, list | tuple):
+        return [in_si(each, source, *path) for each in tables]
+    if not isinstance(tables, dict):
+        return tables
+    told: dict[str, Any] = {}
+    for key, value in tables.items():
+        if key in WRITTEN:
+            raise InputError(source, f"{'.'.join((*path, key))}: a rotary valve has {WRITTEN[key]} in its place")
+        told[IN_DEGREES.get(key, key)] = (
+            _times(value, _si_of(key)) if key in IN_DEGREES else in_si(value, source, *path, key)
+        )
+    return told
+
+
+def as_written(kind: Kind, name: str, value: Any) -> tuple[str, Any]:
+    """Return a key of the plant's files and its value as a kind has them there.
+
+    >>> as_written(ROTARY, "b_over_c_pa_per_m", 1800.0)
+    ('b_over_c_pa_per_deg', 31.41592653589793)
+    """
+    if kind is not ROTARY or name not in WRITTEN:
+        return name, value
+    return WRITTEN[name], _times(value, 1.0 / _si_of(WRITTEN[name]))
+
+
+def _si_of(name: str) -> float:
+    """Return what one of a name's own unit is in SI."""
+    if name.endswith("_per_deg"):
+        return degrees(1.0)
+    return radians(1.0) if name.endswith("_deg") else 1.0
+
+
+def _times(value: Any, factor: float) -> Any:
+    if isinstance(value, dict):
+        return value | {key: _times(value.get(key, other), factor) for key, other in SCALED.items()}
+    return factor * value if isinstance(value, int | float) and not isinstance(value, bool) else value

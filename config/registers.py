@@ -124,12 +124,13 @@ STATUS = (
     Register("position", 104, "float32", "p.u.", "opening, from the closed end"),
     Register("position_scaled", 106, "int16", "1e-4 p.u.", "the same as a whole number"),
     Register("device_status", 107, "uint16", "1", f"the device's own status word, bits: {listed_bits(DeviceStatus)}"),
-    Register("position_m", 108, "float32", "m", "the same times the stroke"),
+    Register("position_m", 108, "float32", "m", "the same times the stroke; NaN: it turns"),
     Register("pressure", 110, "float32", "Pa", "actuator pressure as measured"),
     Register("command", 112, "float32", "Pa", "pressure command"),
     Register("delta_r", 114, "float32", "p.u.", "last change of the reference, kept until the next"),
     Register("sample_age", 116, "float32", "s", "time since the last good measurement"),
     Register("reference_in_force", 118, "float32", "p.u.", "what the law follows; outside automatic, the stem"),
+    Register("position_deg", 134, "float32", "deg", "the same of a valve that turns; NaN: it has a stem"),
     Register("restored", 122, "uint16", "1", f"what was known before the daemon was started: {listed(Restored)}"),
     Register("emergency", 124, "uint16", "1", "CANopen: error code of the device's last EMCY, 0 when it is over"),
     Register("service", 125, "uint16", "1", f"what the service does: {listed(ServiceState)}"),
@@ -309,8 +310,8 @@ EXPERIMENT = (
     Register("experiment_points", 608, "uint16", "1", "how many there are"),
     Register("experiment_state", 609, "uint16", "1", listed(ExperimentState)),
     Register("experiment_elapsed", 610, "float32", "s", "time since its first point, while it is under way"),
-    _writable("experiment_turn", 612, "float32", "m", 0.0, 1e6, "travel at which it retraces its way; 0: never"),
-    _writable("experiment_band", 614, "float32", "m", 0.0, 1e6, "travel that breaks it off; 0: the window alone does"),
+    _writable("experiment_turn", 612, "float32", "p.u.", 0.0, 1.0, "travel at which it retraces its way; 0: never"),
+    _writable("experiment_band", 614, "float32", "p.u.", 0.0, 1.0, "travel that breaks it off; 0: the window alone"),
 )
 
 EVENTS = (

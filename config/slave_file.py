@@ -8,9 +8,10 @@ from pydantic import Field, Tag, model_validator
 
 from config.canopen_device import CanBus
 from config.device import Host
+from config.drive import ROTARY, in_si
 from config.errors import InputError
 from config.file_kinds import require_kind
-from config.loading import Many, NonNegative, Port, Positive, Pressure, Schema, chosen_by, read_toml, validated
+from config.loading import SHIPPED, Many, NonNegative, Port, Positive, Pressure, Schema, chosen_by, read_toml, validated
 from config.modbus_map import SIMULATED_MAP, ModbusMap
 from config.quantities import ActionName
 from config.serial_port import RtuUnit, SerialPort
@@ -186,7 +187,17 @@ def load_slave(path: Path) -> SlaveFile:
     """
     tables = read_toml(path)
     require_kind(tables, "slave", str(path))
+    if _turns(tables.get("valve"), path):
+        tables = in_si(tables, str(path))
     return validated(SlaveFile, tables, str(path), path.parent)
+
+
+def _turns(valve: object, path: Path) -> bool:
+    """Return whether the valve that a slave file names, if there is one, is a rotary valve."""
+    name = str(valve)
+    file = path.parent / name if name.endswith(".toml") else SHIPPED / "valves" / f"{name}.toml"
+    drive = read_toml(file).get("drive") if file.is_file() else None
+    return isinstance(drive, dict) and drive.get("kind") == ROTARY.name
 
 
 def valve_path(slave: SlaveFile, path: Path) -> Path:

@@ -18,10 +18,11 @@ ActionWord = Literal["air_to_open", "air_to_close"]
 
 @dataclass(frozen=True, slots=True)
 class Travel:
-    """The stroke L, m, and whether more air closes the valve."""
+    """The stroke L, m, and whether more air closes the valve; of one that turns, lengths are angles, rad."""
 
     stroke_m: float
     closes: bool = False
+    turns: bool = False
 
     @classmethod
     def of(cls, stroke_m: float, action: ActionWord) -> "Travel":

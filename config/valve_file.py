@@ -15,7 +15,7 @@ from typing import Annotated, Any, Self
 from pydantic import BaseModel, ConfigDict, model_validator
 
 from config.arguments import kinds_held
-from config.drive import KINDS, VALVE, Kind, KindName
+from config.drive import KINDS, ROTARY, VALVE, Kind, KindName
 from config.errors import InputError
 from config.file_kinds import require_kind
 from config.loading import SHIPPED, Many, Schema, Stroke, between, read_toml, validated
@@ -143,6 +143,15 @@ def _of_valve(kind: Kind, table: Any, source: str) -> Any:
         if (own := kind.own(kind.of_valve(key))) != key:
             raise InputError(source, f"effect.{key}: a drive of kind {kind.name} has {own}")
     return {kind.of_valve(key): value for key, value in table.items()}
+
+
+def moved_by_air(file: ValveFile, source: str, who: str) -> ValveFile:
+    """Return the file of a valve, with a stem or one that turns, to one who knows no drive that no pressure moves.
+
+    Raises:
+        InputError: it is such a drive's; says who knows none.
+    """
+    return file if file.valve.own is ROTARY else valve_alone(file, source, who)
 
 
 def valve_alone(file: ValveFile, source: str, who: str) -> ValveFile:

@@ -181,8 +181,8 @@ class Dcs:
         points: Sequence[tuple[float, float]],
         timeout_s: float,
         *,
-        turn_m: float = 0.0,
-        band_m: float = 0.0,
+        turn: float = 0.0,
+        band: float = 0.0,
     ) -> ExperimentState:
         """Have an experiment played; return what became of it once the law has the command back.
 
@@ -192,16 +192,16 @@ class Dcs:
         Args:
             points: times, s, from 0 up, and pressures, Pa.
             timeout_s: broken off after this long.
-            turn_m: travel at which it retraces its way; 0: never.
-            band_m: travel that breaks it off; 0: the file's window alone does.
+            turn: travel, of the stroke, at which it retraces its way; 0: never.
+            band: travel, of the stroke, that breaks it off; 0: the file's window alone does.
 
         Raises:
             DcsError: the daemon refuses the sequence, or it took too long, or no veto gets to it any more.
         """
         for number, (time_s, pressure_pa) in enumerate(points):
             self.set_all({"experiment_point": number, "experiment_time": time_s, "experiment_pressure": pressure_pa})
-        if turn_m or band_m:
-            self.set_all({"experiment_turn": turn_m, "experiment_band": band_m})
+        if turn or band:
+            self.set_all({"experiment_turn": turn, "experiment_band": band})
         try:
             self.set("experiment_start", len(points))
             if (state := self._played_within(timeout_s)) is None:

@@ -6,12 +6,11 @@ from typing import TYPE_CHECKING
 from positioner.cli.parts.daemon_address import add_connection, connected
 
 if TYPE_CHECKING:
-    from config.codes import AlarmState, Ne107Cause
+    from config.codes import Ne107Cause
 
 HELP = "list a valve's alarms with cause and advice; acknowledge or shelve one"
 EXAMPLE = "positioner alarms --acknowledge friction_high"
 
-BITS = ("alarms_active", "alarms_unacknowledged", "alarms_shelved")
 MINUTE_S = 60.0
 
 
@@ -30,8 +29,7 @@ def run(arguments: argparse.Namespace) -> int:
     """Do what is asked for, then print the alarms; exit status 1 while one is unacknowledged."""
     import json
 
-    from config.alarm_advice import ADVICE
-    from config.codes import AlarmState
+    from positioner.observer.alarms import BITS, alarms
 
     wanted = {name: _cause(getattr(arguments, name)) for name in ("shelve", "unshelve") if getattr(arguments, name)}
     if arguments.acknowledge not in (None, "all"):
@@ -42,31 +40,18 @@ def run(arguments: argparse.Namespace) -> int:
             written = {"alarm_acknowledge": cause} if name == "acknowledge" else {"alarm_shelve": cause}
             dcs.set_all({**written, **({} if name == "acknowledge" else {"alarm_shelve_time": for_s})})
         if arguments.acknowledge == "all":
-            unseen = int(dcs.get("alarms_unacknowledged"))
-            for cause in (each for each in ADVICE if unseen >> (each - 1) & 1):
-                dcs.set("alarm_acknowledge", cause)
-        active, unseen, shelved = (int(each) for each in dcs.get_all(*BITS).values())
-    states = {cause: _state(*(bits >> (cause - 1) & 1 for bits in (active, unseen, shelved))) for cause in ADVICE}
-    shown = {cause: state for cause, state in states.items() if state is not AlarmState.NORMAL}
+            for each in alarms(dcs.get_all(*BITS)):
+                if each.unseen:
+                    dcs.set("alarm_acknowledge", each.cause)
+        shown = list(alarms(dcs.get_all(*BITS)))
     if arguments.json:
-        print(json.dumps({each.name.lower(): {"state": it.text, "cause": each.text} for each, it in shown.items()}))
-        return 1 if unseen else 0
-    for cause, state in shown.items():
-        print(f"{cause.name.lower():20} {state.text:36} {cause.text}\n{'':20} {ADVICE[cause]}")
-    if not shown:
-        print("no alarms")
-    return 1 if unseen else 0
-
-
-def _state(holds: int, unseen: int, shelved: int) -> "AlarmState":
-    """Return the state that three bits say."""
-    from config.codes import AlarmState
-
-    if shelved:
-        return AlarmState.SHELVED
-    if holds:
-        return AlarmState.UNACKNOWLEDGED if unseen else AlarmState.ACKNOWLEDGED
-    return AlarmState.RETURNED if unseen else AlarmState.NORMAL
+        print(json.dumps({each.name: {"state": each.state.text, "cause": each.cause.text} for each in shown}))
+    else:
+        for each in shown:
+            print(f"{each.name:20} {each.state.text:36} {each.cause.text}\n{'':20} {each.advice}")
+        if not shown:
+            print("no alarms")
+    return 1 if any(each.unseen for each in shown) else 0
 
 
 def _cause(name: str) -> "Ne107Cause":

@@ -24,7 +24,10 @@ STROKE_UNKNOWN_M = 1.0
 
 def add_arguments(parser: argparse.ArgumentParser) -> None:
     """Declare the command line."""
-    add_config(parser, text="a daemon's file; [valve] stroke_m may be missing, and the daemon must not run")
+    add_config(
+        parser,
+        text="a daemon's file; [valve] stroke_m may be missing, travel_deg not; the daemon must not run",
+    )
     parser.add_argument("--valve", dest="name", metavar="NAME", help="which of that file's valves")
     parser.add_argument("--yes", action="store_true", help="ask nothing: move it, and write what is found")
     parser.add_argument("--keep", choices=("factory", "as_found", "as_left"), help="keep the outcome as this")
@@ -78,7 +81,7 @@ def _file(path: Path, name: str | None) -> "DaemonFile":
         load_daemon(path, name)
         raise InputError(str(path), "valve: several of them; commission each by a file of its own")
     valve = dict(tables.get("valve") or {})
-    if "stroke_m" in valve:
+    if valve.keys() & {"stroke_m", "travel_deg"}:
         return load_daemon(path, name)
     require_kind(tables | {"valve": valve | {"stroke_m": STROKE_UNKNOWN_M}}, "daemon", str(path))
     whole = {key: table for key, table in tables.items() if key != "law"}

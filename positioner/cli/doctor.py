@@ -141,7 +141,8 @@ def _bus(file: "DaemonFile", _config: Path) -> str:
         raise FailedCheck(f"a reading takes {1e3 * took_s:.2f} ms, longer than cycle.period_s")
     # No failure: one that nobody has commanded may well say so, or wait for its master to be made ready.
     said = unfit(reading)
-    seen = [f"position {reading.position_m:.5f} m, holds {held_pa:.0f} Pa, {1e3 * took_s:.2f} ms a reading"]
+    position = file.valve.plain.said(reading.position_m, ".5f")
+    seen = [f"position {position}, holds {held_pa:.0f} Pa, {1e3 * took_s:.2f} ms a reading"]
     if in_registers := travel_in_registers(file):
         seen.append(in_registers)
     return f"{', '.join(seen)}; but {said}" if said else ", ".join(seen)

@@ -44,7 +44,8 @@ def run(arguments: argparse.Namespace) -> int:
             readings, took_s = _burst(driver)
             last = readings[-1]
             wrong = impossible(file, held_pa, last, limits) or unfit(last) or doubts(file, held_pa, last)
-            print(_line(readings, took_s, last.position_m / limits.stroke_m, wrong), flush=True)
+            position = f"{file.valve.plain.said(last.position_m, '.6f')} ({last.position_m / limits.stroke_m:.4f} p.u.)"
+            print(_line(readings, took_s, position, wrong), flush=True)
             if count == arguments.count:
                 break
             time.sleep(max(0.0, 1.0 - took_s))
@@ -84,9 +85,9 @@ def _burst(driver: "Driver") -> tuple[list["Reading"], float]:
     return readings, time.perf_counter() - started_s
 
 
-def _line(readings: list["Reading"], took_s: float, position_pu: float, wrong: str) -> str:
+def _line(readings: list["Reading"], took_s: float, position: str, wrong: str) -> str:
     last = readings[-1]
-    parts = [f"{len(readings) / took_s:6.0f} readings/s", f"position {last.position_m:.6f} m ({position_pu:.4f} p.u.)"]
+    parts = [f"{len(readings) / took_s:6.0f} readings/s", f"position {position}"]
     if last.pressure_pa is not None:
         parts.append(f"pressure {last.pressure_pa:.1f} Pa")
     if last.device_time_s is not None:

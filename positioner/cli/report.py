@@ -29,7 +29,7 @@ def run(arguments: argparse.Namespace) -> int:
     """Write the report; 1 if nothing is kept."""
     from config.daemon_file import load_daemon
     from config.errors import CommandFailed, InputError
-    from positioner.cli.parts.valve_test import configured, records_folder
+    from positioner.cli.parts.valve_test import records_folder
     from positioner.tests_on_the_valve.as_found_report import ValveReport, as_html, recommended_by, write_pdf
     from positioner.tests_on_the_valve.kept_records import records
 
@@ -42,7 +42,7 @@ def run(arguments: argparse.Namespace) -> int:
     kept = records(folder)
     if not any(each.kind for each in kept):
         raise CommandFailed(f"nothing is kept in {folder}: a test with --keep as_found or as_left keeps it")
-    recommended = recommended_by(configured(file)) | _recommended(arguments.recommended, kept)
+    recommended = recommended_by(file) | _recommended(arguments.recommended, kept)
     report = ValveReport(file.valve.name, kept, recommended)
     if arguments.out.suffix.lower() == ".pdf":
         try:
@@ -64,14 +64,14 @@ def _recommended(words: Sequence[str], kept: "Sequence[object]") -> dict[str, fl
     from config.errors import InputError
     from positioner.tests_on_the_valve.kept_records import Record
 
-    known = {each.name for record in kept if isinstance(record, Record) for each in record.outcome.quantities}
-    told = {}
+    quantities = [each for record in kept if isinstance(record, Record) for each in record.outcome.quantities]
+    known, told = {each.own_name: each.name for each in quantities}, {}
     for word in words:
         name, _, value = word.partition("=")
         if name not in known:
             raise InputError(f"--recommended {word}", f"no figure of that name; there are: {', '.join(sorted(known))}")
         try:
-            told[name] = float(value)
+            told[known[name]] = float(value)
         except ValueError:
             raise InputError(f"--recommended {word}", "allowed is FIGURE=NUMBER") from None
     return told

@@ -344,4 +344,6 @@ def _recorder(file: DaemonFile, source: Path) -> Recorder | None:
         return None
     folder = source.parent / file.recorder.folder
     table = file.recorder
-    return Recorder(folder, file.valve.name, table.file_bytes, table.keep_files, table.file_s, table.compress)
+    return Recorder(
+        folder, file.valve.name, table.file_bytes, table.keep_files, table.file_s, table.compress, file.valve.kind
+    )

@@ -17,14 +17,14 @@ class WriteRejected(Exception):
         self.reason = reason
 
 
-def experiment_asked(before: ExperimentRequest, values: Mapping[str, float]) -> ExperimentRequest:
-    """Return what is asked for after writes to the experiment's registers."""
+def experiment_asked(before: ExperimentRequest, values: Mapping[str, float], stroke_m: float) -> ExperimentRequest:
+    """Return what is asked for after writes to the experiment's registers; travels there are shares of the stroke."""
     after = replace(
         before,
         consented=bool(values.get("experiment_consent", before.consented)),
         vetoed=bool(values.get("experiment_veto", before.vetoed)),
-        turn_m=values.get("experiment_turn", before.turn_m),
-        band_m=values.get("experiment_band", before.band_m),
+        turn_m=stroke_m * values.get("experiment_turn", before.turn_m / stroke_m),
+        band_m=stroke_m * values.get("experiment_band", before.band_m / stroke_m),
     )
     point = [values.get(f"experiment_{what}") for what in ("point", "time", "pressure")]
     if any(each is not None for each in point):
@@ -48,7 +48,7 @@ def experiment_asked(before: ExperimentRequest, values: Mapping[str, float]) -> 
     return after
 
 
-def experiment_getters() -> dict[str, Callable[[Snapshot, Requests], float]]:
+def experiment_getters(stroke_m: float) -> dict[str, Callable[[Snapshot, Requests], float]]:
     """Return, by register, what it serves of a snapshot."""
 
     def last(request: Requests, which: int) -> float:
@@ -64,7 +64,7 @@ def experiment_getters() -> dict[str, Callable[[Snapshot, Requests], float]]:
         "experiment_start": lambda _s, _r: 0,
         "experiment_points": lambda _, r: len(r.experiment.points),
         "experiment_state": lambda s, _: s.decision.experiment.state,
-        "experiment_turn": lambda _, r: r.experiment.turn_m,
-        "experiment_band": lambda _, r: r.experiment.band_m,
+        "experiment_turn": lambda _, r: r.experiment.turn_m / stroke_m,
+        "experiment_band": lambda _, r: r.experiment.band_m / stroke_m,
         "experiment_elapsed": lambda s, _: s.decision.experiment.elapsed_s(s.sample.now_s),
     }

@@ -12,10 +12,12 @@ import math
 
 from config.daemon_file import DaemonFile, LawTable
 from config.device import ModbusDevice
+from config.drive import Scale
 from config.modbus_map import Place
 from drivers.boundary import Reading
 from positioner.control.supervision import Limits
 
+PASCAL = Scale(1.0, "Pa")
 LEAST_SHARE = 1e-7
 """Of a stroke or a range of pressures: no device resolves less, so that a number below, and not 0, is none."""
 MOST_SPANS = 5.0
@@ -36,19 +38,20 @@ BALANCE_MARGIN = 0.02
 def impossible(file: DaemonFile, held_pa: float, reading: Reading, limits: Limits) -> str:
     """Return why position or command cannot be what they are taken for, by key and value; empty where they can."""
     least_m, span_pa = LEAST_SHARE * limits.stroke_m, file.pressure.maximum_pa - file.pressure.minimum_pa
-    position_m = reading.position_m
+    position_m, read = reading.position_m, file.valve.plain
     if not limits.plausible(position_m) or 0 < abs(position_m) < least_m:
         margin_m = limits.travel_margin * limits.stroke_m
         return (
-            f"device.map.position_m: the device says {position_m:g} m, allowed is {-margin_m:g} to "
-            f"{limits.stroke_m + margin_m:g} m (valve.stroke_m and safety.travel_margin); "
-            f"{_other_orders(file, 'position_m', position_m, (least_m, limits.stroke_m), 'm')}"
+            f"device.map.{file.valve.place}: the device says {read.said(position_m, 'g')}, "
+            f"allowed is {read.number(-margin_m, 'g')} to {read.said(limits.stroke_m + margin_m, 'g')} "
+            f"(valve.{file.valve.length} and safety.travel_margin); "
+            f"{_other_orders(file, 'position_m', position_m, (least_m, limits.stroke_m), read)}"
         )
     low_pa, high_pa, least_pa = file.pressure.minimum_pa, file.pressure.maximum_pa, LEAST_SHARE * span_pa
     if not low_pa <= held_pa <= high_pa or 0 < abs(held_pa) < least_pa:
         return (
             f"device.map.command_pa: the device holds {held_pa:g} Pa, allowed is {low_pa:g} to {high_pa:g} Pa "
-            f"([pressure]); {_other_orders(file, 'command_pa', held_pa, (max(least_pa, low_pa), high_pa), 'Pa')}"
+            f"([pressure]); {_other_orders(file, 'command_pa', held_pa, (max(least_pa, low_pa), high_pa), PASCAL)}"
         )
     return ""
 
@@ -76,7 +79,7 @@ def _pressure_doubt(file: DaemonFile, held_pa: float, shown_pa: float | None) ->
     maximum_pa, span_pa = file.pressure.maximum_pa, file.pressure.maximum_pa - file.pressure.minimum_pa
     most_pa, least_pa = maximum_pa + MOST_SPANS * span_pa, LEAST_SHARE * span_pa
     if not VACUUM_PA <= shown_pa <= most_pa or 0 < abs(shown_pa) < least_pa:
-        fits = _other_orders(file, "pressure_pa", shown_pa, (least_pa, most_pa), "Pa")
+        fits = _other_orders(file, "pressure_pa", shown_pa, (least_pa, most_pa), PASCAL)
         return f"device.map.pressure_pa: it shows {shown_pa:g} Pa, commands go up to {maximum_pa:g} Pa; {fits}"
     if held_pa <= 0 or max(held_pa, shown_pa) < SHARE_OF_SPAN * span_pa:
         return ""
@@ -98,11 +101,13 @@ def _position_doubt(file: DaemonFile, held_pa: float, reading: Reading) -> str:
     position_m = file.valve.travel.turned_m(reading.position_m)
     if low_m <= position_m <= high_m:
         return ""
+    read = file.valve.plain
     for times in TEN_TIMES:
         if low_m <= position_m / times <= high_m:
             return (
-                f"position {position_m:g} m is {times:g} times what [law] has at {pressure_pa:g} Pa, "
-                f"{max(low_m, 0):g} to {high_m:g} m: device.map.position_m.scale, or valve.stroke_m?"
+                f"position {read.said(position_m, 'g')} is {times:g} times what [law] has at {pressure_pa:g} Pa, "
+                f"{read.number(max(low_m, 0), 'g')} to {read.said(high_m, 'g')}: "
+                f"device.map.{file.valve.place}.scale, or valve.{file.valve.length}?"
             )
     return ""
 
@@ -119,10 +124,10 @@ def _resting_m(
 def _registers_doubt(file: DaemonFile) -> str:
     """Return which register cannot hold what it must."""
     needed = (
-        ("position_m", file.valve.stroke_m, "m", "valve.stroke_m"),
-        ("command_pa", file.pressure.maximum_pa, "Pa", "pressure.maximum_pa"),
+        ("position_m", file.valve.place, file.valve.stroke_m, file.valve.plain, f"valve.{file.valve.length}"),
+        ("command_pa", "command_pa", file.pressure.maximum_pa, PASCAL, "pressure.maximum_pa"),
     )
-    for name, most, unit, key in needed:
+    for name, own, most, read, key in needed:
         place = _place(file, name)
         if place is None:
             continue
@@ -131,8 +136,8 @@ def _registers_doubt(file: DaemonFile) -> str:
             place.format.encode(raw)
         except ValueError:
             return (
-                f"device.map.{name}: {most:g} {unit} ({key}) would be {raw:g}, more than {place.type} holds: "
-                f"device.map.{name}.scale?"
+                f"device.map.{own}: {read.said(most, 'g')} ({key}) would be {raw:g}, more than {place.type} holds: "
+                f"device.map.{own}.scale?"
             )
     return ""
 
@@ -141,11 +146,13 @@ def _place(file: DaemonFile, name: str) -> Place | None:
     return file.device.map.places.get(name) if isinstance(file.device, ModbusDevice) else None
 
 
-def _other_orders(file: DaemonFile, name: str, value: float, allowed: tuple[float, float], unit: str) -> str:
+def _other_orders(file: DaemonFile, name: str, value: float, allowed: tuple[float, float], read: Scale) -> str:
     """Say in which other order of words and bytes the same registers would say what is allowed."""
     place = _place(file, name)
     others = {} if place is None or not math.isfinite(value) else place.in_other_orders(value)
-    fitting = [f"{keys} would read {other:g} {unit}" for keys, other in others.items() if _within(other, allowed)]
+    fitting = [
+        f"{keys} would read {read.said(other, 'g')}" for keys, other in others.items() if _within(other, allowed)
+    ]
     return ", ".join(fitting) or "check the map"
 
 

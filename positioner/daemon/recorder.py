@@ -22,6 +22,8 @@ from pathlib import Path
 from threading import Event, Thread
 from typing import Protocol
 
+from config.drive import COLUMNS as OF_KIND
+from config.drive import VALVE, Kind
 from config.errors import InputError
 from config.file_stem import file_stem
 from positioner.daemon.logs import log_event
@@ -74,6 +76,7 @@ class Recorder:
         keep_files: the oldest beyond so many are deleted.
         file_s: a file so old is followed by a new one; 0 is never.
         compress: those before the newest two.
+        kind: whose names the columns have.
     """
 
     def __init__(
@@ -84,6 +87,7 @@ class Recorder:
         keep_files: int,
         file_s: float = 0.0,
         compress: bool = False,
+        kind: Kind = VALVE,
     ) -> None:
         self.unrecorded = 0
         self._folder = folder
@@ -96,6 +100,7 @@ class Recorder:
         self._stopping = Event()
         self._thread = Thread(target=self._work, name="recorder", daemon=True)
         self._valve = " ".join(name.split())
+        self._columns = ",".join(kind.own(each) if each in OF_KIND else each for each in COLUMNS)
         self._file = -1
         self._room = 0
         self._begun_s = 0.0
@@ -187,7 +192,7 @@ class Recorder:
     def _open_next(self) -> None:
         """Begin a file, and delete the oldest beyond those to keep."""
         now = datetime.now(UTC)
-        header = f"# valve: {self._valve}\n# recorded: {now:%Y-%m-%dT%H:%M:%SZ}\n{','.join(COLUMNS)}\n".encode()
+        header = f"# valve: {self._valve}\n# recorded: {now:%Y-%m-%dT%H:%M:%SZ}\n{self._columns}\n".encode()
         others = _files(self._folder, self._stem)
         number = _number(others[-1]) + 1 if others else 1
         path = self._folder / f"{self._stem}-{now:%Y%m%dT%H%M%SZ}-{number:04d}.csv"

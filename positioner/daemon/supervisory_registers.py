@@ -212,7 +212,9 @@ class SupervisoryRegisters:
         if values.get("health_reset") == 1:
             requests = replace(requests, health_resets=requests.health_resets + 1)
         if values.keys() & EXPERIMENT_NAMES:
-            requests = replace(requests, experiment=experiment_asked(requests.experiment, values))
+            requests = replace(
+                requests, experiment=experiment_asked(requests.experiment, values, self._travel.stroke_m)
+            )
         if "heartbeat" in values:
             self._heartbeat = int(values["heartbeat"])
             requests = replace(requests, heartbeats=requests.heartbeats + 1)
@@ -269,7 +271,7 @@ def _getters(cycle: Cycle, travel: Travel, path: SignalPath) -> dict[str, Getter
         **_statistics_getters(cycle),
         **_identity_getters(),
         **_health_getters(cycle, travel.stroke_m),
-        **experiment_getters(),
+        **experiment_getters(travel.stroke_m),
         **event_getters(cycle),
     }
     of_others = {
@@ -326,7 +328,8 @@ def _status_getters(cycle: Cycle, travel: Travel) -> dict[str, Getter]:
         "position": lambda s, _: travel.opening(s.sample.position_m),
         "position_scaled": lambda s, _: SCALE * travel.opening(s.sample.position_m),
         "device_status": lambda s, _: s.sample.status,
-        "position_m": lambda s, _: travel.turned_m(s.sample.position_m),
+        "position_m": lambda s, _: math.nan if travel.turns else travel.turned_m(s.sample.position_m),
+        "position_deg": lambda s, _: math.degrees(travel.turned_m(s.sample.position_m)) if travel.turns else math.nan,
         "pressure": lambda s, _: s.sample.pressure_pa,
         "command": lambda s, _: s.decision.command_pa,
         "delta_r": lambda s, _: travel.opening_change(s.decision.delta_r_m),

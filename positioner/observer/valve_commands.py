@@ -8,7 +8,7 @@ from collections.abc import Callable, Mapping
 from dataclasses import dataclass
 from threading import Event, Lock
 
-from config.codes import Fault, Mode
+from config.codes import Fault, Mode, Ne107Cause
 from config.errors import CommandFailed, InputError
 from config.registers import register_named
 from config.roles import Role
@@ -22,6 +22,7 @@ SAME = 1e-6
 """Of a value that was written and the one that is read back: a float32 has 24 bits."""
 IDENTIFY_WITHIN_S = 600.0
 END_WITHIN_S = 5.0
+MINUTE_S = 60.0
 EXCITATION = ("eta_1", "eta_2", "eta_3")
 
 
@@ -143,6 +144,25 @@ class ValveCommands:
             return Confirmation(gone, f"acknowledged, {said}")
 
         return self._within_rights(role, ("acknowledge",), written)
+
+    def acknowledge_alarm(self, role: Role, cause: Ne107Cause) -> Confirmation:
+        """Say that an alarm was seen."""
+
+        def written(dcs: Dcs) -> Confirmation:
+            dcs.set("alarm_acknowledge", cause)
+            return Confirmation(True, f"acknowledged: {cause.text}")
+
+        return self._within_rights(role, ("alarm_acknowledge",), written)
+
+    def shelve_alarm(self, role: Role, cause: Ne107Cause, for_s: float) -> Confirmation:
+        """Put an alarm aside for a while, s; 0: show it again."""
+
+        def written(dcs: Dcs) -> Confirmation:
+            dcs.set_all({"alarm_shelve": cause, "alarm_shelve_time": for_s})
+            what = f"shelved for {for_s / MINUTE_S:.3g} min" if for_s else "shown again"
+            return Confirmation(True, f"{what}: {cause.text}")
+
+        return self._within_rights(role, ("alarm_shelve",), written)
 
     def identify(self, role: Role, excitation: Mapping[str, float], show: Callable[[float], None]) -> Confirmation:
         """Identify the valve, which moves it; returns when it is over. Refused where a permissive does not hold.

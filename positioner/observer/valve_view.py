@@ -55,6 +55,11 @@ class ValvePicture:
         """Return what was read of a register last; NaN where it never was."""
         return self.values.get(register, math.nan)
 
+    @property
+    def turns(self) -> bool:
+        """Whether the valve turns: its positions, in m otherwise, are rad."""
+        return math.isfinite(self.value("position_deg"))
+
     def text(self, register: str) -> str:
         """Return what a register of a code says."""
         return code_text(register, self.value(register))
@@ -94,6 +99,8 @@ class ValveView:
 
     def take(self, time_s: float, values: Mapping[str, float]) -> None:
         """Take a reading of some registers, by name; the first after a failure has them all."""
+        if math.isfinite(angle_deg := values.get("position_deg", math.nan)):
+            values = {**values, "position_m": math.radians(angle_deg)}
         with self._lock:
             before, memory = self._values, after_reading(self._memory, time_s, values)
             self._note_connection(time_s, memory)
@@ -143,6 +150,11 @@ class ValveView:
         """A row a minute since this began to look, and what was seen before."""
         with self._lock:
             return tuple(self._friction)
+
+    @property
+    def turns(self) -> bool:
+        """Whether the valve turns; what it is in m otherwise, is then in rad."""
+        return math.isfinite(self._values.get("position_deg", math.nan))
 
     @property
     def stroke_m(self) -> float:

@@ -13,6 +13,7 @@ from positioner.dcs import Dcs, DcsError
 from positioner.observer.friction_file import FrictionFile
 from positioner.observer.poller import POLL_S, REPLY_WITHIN_S, Poller
 from positioner.observer.valve_commands import ValveCommands
+from positioner.observer.valve_tests import ValveTests
 from positioner.observer.valve_view import FRICTION_KEPT, ValvePicture, ValveView
 
 WRITE_WITHIN_S = 2.0
@@ -38,7 +39,9 @@ class Place:
     keep: Path | None = None
     """The folder that keeps what the page has seen of friction."""
     settings: DaemonFile | None = None
-    """The daemon's file."""
+    """The daemon's file, and"""
+    file: Path | None = None
+    """where it is."""
 
     def connection(self, role: Role) -> Dcs:
         """Return a closed connection for a role.
@@ -61,11 +64,17 @@ class WatchedValve:
         self.place = place
         self.view = _view(place)
         self.commands = ValveCommands(place.connection, self.picture)
+        self.tests = ValveTests(place)
         self._poller = Poller(self.view, lambda: place.connection(Role.OBSERVER))
 
     def picture(self) -> ValvePicture:
         """Return what is known now."""
         return self.view.at(time.monotonic())
+
+    def end(self) -> None:
+        """Break off what moves the valve, and wait until the law has its command back."""
+        self.tests.end()
+        self.commands.end()
 
     def start(self) -> None:
         """Begin to poll."""

@@ -17,6 +17,7 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
+from config.daemon_file import DaemonFile
 from config.results.block import Table, as_text
 from positioner.tests_on_the_valve.kept_records import KINDS, Record, change_table, changes
 from positioner.tests_on_the_valve.outcome import Curve, Picture, Quantity
@@ -127,18 +128,17 @@ class ValveReport:
         return Quantity(quantity.name, "", quantity.unit, quantity.figure, value).shown_expected
 
 
-def recommended_by(configuration: Mapping[str, Any]) -> dict[str, float]:
-    """Return what the daemon's file says that figures should be, by name."""
-    valve, law = configuration.get("valve") or {}, configuration.get("law") or {}
-    told: dict[str, float] = {}
-    if stroke_m := valve.get("stroke_m"):
-        told["travel_m"] = float(stroke_m)
-    slope, friction = law.get("b_over_c_pa_per_m"), law.get("k_over_c_pa")
-    if slope and friction:
-        offset = float(law.get("offset_pa") or 0.0)
-        told |= {"spring_pa_per_m": -float(slope), "friction_pa": -float(friction), "bench_low_pa": offset}
-        if stroke_m:
-            told["bench_high_pa"] = offset - float(slope) * float(stroke_m)
+def recommended_by(file: DaemonFile) -> dict[str, float]:
+    """Return what the daemon's file says that figures should be, by name, SI."""
+    stroke_m, law = file.valve.stroke_m, file.law
+    told = {"travel_m": stroke_m}
+    if law is not None and law.b_over_c_pa_per_m is not None and law.k_over_c_pa is not None:
+        told |= {
+            "spring_pa_per_m": -law.b_over_c_pa_per_m,
+            "friction_pa": -law.k_over_c_pa,
+            "bench_low_pa": law.offset_pa,
+            "bench_high_pa": law.offset_pa - law.b_over_c_pa_per_m * stroke_m,
+        }
     return told
 
 

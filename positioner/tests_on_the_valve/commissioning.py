@@ -16,12 +16,13 @@ A reading that falls as the command rises is that of a valve which air closes, f
 
 from collections.abc import Callable
 from dataclasses import dataclass, replace
-from math import ceil, floor, hypot, isfinite, log10, sqrt
+from math import ceil, degrees, floor, hypot, isfinite, log10, sqrt
 from typing import Protocol
 
 import numpy as np
 
 from config.codes import ValveTestVerdict
+from config.drive import Kind, as_written
 from config.noise import quantum_m
 from config.recording import Column, Recording
 from config.travel import ActionWord
@@ -48,6 +49,8 @@ MARGIN = 0.15
 SUPPLY_MARGIN = 0.05
 """Of the same: with less the supply is hardly enough."""
 ROUNDED_PA = 1000.0
+ANGLE_DIGITS = 3
+"""Of degrees: what no transmitter resolves."""
 ZERO_OFF = 0.01
 """Of the travel: a reading at the closed end that is farther from 0 is off."""
 
@@ -68,6 +71,13 @@ class Proposal:
     key: str
     value: float | str
     reason: str
+
+    def of(self, kind: Kind) -> "Proposal":
+        """Return the key and the value that the file of such a valve has."""
+        if self.key == "stroke_m" and kind.turns:
+            return replace(self, key="travel_deg", value=round(degrees(float(self.value)), ANGLE_DIGITS))
+        key, value = as_written(kind, self.key, self.value)
+        return self if key == self.key else replace(self, key=key, value=float(f"{value:.6g}"))
 
     @property
     def line(self) -> str:
@@ -131,12 +141,15 @@ def _commissioned(valve: Watching, name: str, bounds: Bounds, show: Callable[[st
     half_pa = 0.5 * sum(each.value or 0.0 for each in bench)
     leak = _leak(_played(valve, _held(bounds, start_pa, half_pa), show), sign)
     steps = _steps(valve, bounds, start_pa, half_pa, friction, (travel.value, sign, name), show)
+    kind = recordings[0].kind
     action: ActionWord = "air_to_open" if sign > 0 else "air_to_close"
     opening, closing = (up_s, down_s) if sign > 0 else (down_s, up_s)
     closed_m = low.value if sign > 0 else -high.value
     adequate, notes = _supply(found, bounds)
     if abs(closed_m) > ZERO_OFF * travel.value:
-        notes.append(f"the reading at the closed end is {1e3 * closed_m:.3g} mm: its zero is off, set it in the device")
+        notes.append(
+            f"the reading at the closed end is {kind.length.said(closed_m)}: its zero is off, set it in the device"
+        )
     quantities = (
         Quantity(
             "closed_m", "reading at the closed end", "m", Figure(closed_m, (low if sign > 0 else high).plus_minus)
@@ -159,8 +172,8 @@ def _commissioned(valve: Watching, name: str, bounds: Bounds, show: Callable[[st
         (f"more air {'opens' if sign > 0 else 'closes'} it", *notes, *found.notes[-2:-1]),
         found.tables,
         found.picture,
-    )
-    return Commissioned(outcome, tuple(_proposals(outcome, action, bounds)))
+    ).of(kind)
+    return Commissioned(outcome, tuple(each.of(kind) for each in _proposals(outcome, action, bounds)))
 
 
 LEFT_OUT = frozenset({"low_m", "high_m", "noise_m", "friction_at_rate_pa", "dynamic_error_band_mean"})
@@ -335,10 +348,10 @@ def _proposals(outcome: Outcome, action: ActionWord, bounds: Bounds) -> list[Pro
                 "law",
                 "b_over_c_pa_per_m",
                 -_rounded(slope.value, slope.plus_minus),
-                "less the spring rate over the area",
+                "less the spring rate, as a pressure",
             ),
             Proposal(
-                "law", "k_over_c_pa", -_rounded(friction.value, friction.plus_minus), "less the friction over the area"
+                "law", "k_over_c_pa", -_rounded(friction.value, friction.plus_minus), "less the friction, as a pressure"
             ),
             Proposal("law", "offset_pa", _rounded(at_zero_pa, low.plus_minus), "the bench set's lower end"),
         ]

@@ -13,6 +13,7 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 
 from config.codes import ExperimentState, ValveTestVerdict
+from config.drive import VALVE, Kind
 from config.errors import InputError
 from positioner.response.figure import Figure, undetermined
 from positioner.tests_on_the_valve.breakout import HELD_S, Breakout, breakout, rest_before, tolerance_m
@@ -100,14 +101,15 @@ def continuous_stroke(
             f"the stem did not move {' and '.join(still)} as far as the time limit let the command go: "
             "experiment.limit_s, or a faster --rate"
         )
+    kind = next((each.recording.kind for each in played if each.recording is not None), VALVE)
     return Outcome(
         TEST,
         valve,
         tuple(_figures(up, down, rests[-1] - rests[0] if rests else 0.0, followed_m, slope_pa_per_m)),
         tuple(dict.fromkeys(verdicts)) or (ValveTestVerdict.PASSED,),
         tuple(notes),
-        picture=_picture(played),
-    )
+        picture=_picture(played, kind),
+    ).of(kind)
 
 
 def _figures(
@@ -129,16 +131,16 @@ def _figures(
     return [
         Quantity("breaks_up_pa", "breaks loose upwards at", "Pa", told[0]),
         Quantity("breaks_down_pa", "breaks loose downwards at", "Pa", told[1]),
-        Quantity("breakaway_pa", "break-away friction over the area", "Pa", figure),
+        Quantity("breakaway_pa", "break-away friction, as a pressure", "Pa", figure),
         Quantity("breakaway_most_pa", "at the most", "Pa", most),
         Quantity("breakaway_least_pa", "at the least", "Pa", least),
     ]
 
 
-def _picture(played: Sequence[Played]) -> Picture:
+def _picture(played: Sequence[Played], kind: Kind) -> Picture:
     curves = [
-        Curve(name, 1e-3 * each.recording.command_pa, 1e3 * each.recording.position_m)
+        Curve(name, each.recording.command_pa, each.recording.position_m)
         for name, each in zip(("up", "down"), played, strict=False)
         if each.recording is not None
     ]
-    return Picture("command, kPa", "travel, mm", tuple(curves))
+    return Picture.of_travel(kind, curves)

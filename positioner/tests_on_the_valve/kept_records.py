@@ -18,13 +18,15 @@ from typing import Any
 
 import numpy as np
 
+from config.drive import ROTARY
 from config.errors import InputError
 from config.file_stem import file_stem
 from config.json_value import json_value
 from config.results.block import Table
 from config.whole_file import replace_whole
 from positioner.response.figure import Figure
-from positioner.tests_on_the_valve.outcome import Curve, Outcome, Picture, Quantity
+from positioner.tests_on_the_valve.outcome import TURNED, Curve, Outcome, Picture, Quantity
+from positioner.tests_on_the_valve.ramps import SAME_RATE
 
 KINDS = ("factory", "as_found", "as_left")
 """What a record is kept as; the newest of a kind stands for it."""
@@ -39,6 +41,10 @@ TREND = 8
 """Records that a trend shows."""
 MOST_POINTS = 600
 """Of a curve that is kept: more than a picture shows."""
+RATE = "rate_pa_per_s"
+"""The figure that says how fast the slowest ramp was."""
+AT_ITS_RATE = frozenset({"friction_at_rate_pa", "lag_pa", "dynamic_error_band", "dynamic_error_band_mean"})
+"""Figures that hold for a ramp of their own rate: compared with those of such a one alone."""
 MEANS: Mapping[str, tuple[str, str]] = {
     "friction_pa": (
         "friction lower: packing loose or worn, it may leak",
@@ -165,9 +171,17 @@ def baseline(folder: Path, test: str, against: str | None) -> Record | None:
 def changes(now: Outcome, before: Outcome) -> list[Change]:
     """Return the figures of both, how far each is off; one without a +- can be compared with nothing."""
     then = {each.name: each for each in before.quantities}
-    both = [(each, then[each.name]) for each in now.quantities if each.name in then]
+    apart = AT_ITS_RATE if _rates_differ(now, before) else frozenset()
+    both = [(each, then[each.name]) for each in now.quantities if each.name in then.keys() - apart]
     told = [pair for pair in both if all(each.figure.value is None or each.figure.plus_minus for each in pair)]
     return [Change(each, was, _deviations(each.figure, was.figure)) for each, was in told]
+
+
+def _rates_differ(*outcomes: Outcome) -> bool:
+    """Whether ramps were faster in one: the rate is what the limits of pressure and time permitted."""
+    rates = [each.figure.value for outcome in outcomes for each in outcome.quantities if each.name == RATE]
+    known = [each for each in rates if each is not None]
+    return len(known) == len(outcomes) and max(known) > (1.0 + SAME_RATE) * min(known)
 
 
 def change_table(told: Sequence[Change], since: str) -> Table:
@@ -239,7 +253,8 @@ def _read(path: Path) -> Record:
 def _quantities(told: Mapping[str, Any]) -> Iterator[Quantity]:
     for name, each in told.items():
         figure = Figure(each["value"], each["plus_minus"], each["reason"])
-        yield Quantity(name, each["text"], each["unit"], figure, each["expected"])
+        inside = ROTARY.of_valve(name) if each["unit"] in TURNED.values() else name
+        yield Quantity(inside, each["text"], each["unit"], figure, each["expected"])
 
 
 def _picture(told: Mapping[str, Any]) -> Picture:

@@ -1,10 +1,12 @@
 """What a test on the valve comes to: figures with their uncertainty, verdicts by their codes, a picture."""
 
-from collections.abc import Mapping, Sequence
-from dataclasses import dataclass, field
-from typing import TYPE_CHECKING
+from collections.abc import Iterable, Mapping, Sequence
+from dataclasses import dataclass, field, replace
+from math import degrees, radians
+from typing import TYPE_CHECKING, Self
 
 from config.codes import ValveTestVerdict
+from config.drive import ROTARY, Kind
 from config.recording import Column
 from config.results.block import Block, Table
 from config.results.result import Result
@@ -14,7 +16,14 @@ if TYPE_CHECKING:
     from matplotlib.axes import Axes
     from matplotlib.figure import Figure as Drawing
 
+TURNED = {"m": "rad", "m/s": "rad/s", "m/Pa": "rad/Pa", "Pa/m": "Pa/rad", "N": "N m", "N/m": "N m/rad"}
+"""Units of a valve that turns, by those of one with a stem."""
 SHOWN = {
+    "rad": (degrees(1.0), "deg"),
+    "rad/s": (degrees(1.0), "deg/s"),
+    "rad/Pa": (1e3 * degrees(1.0), "deg/kPa"),
+    "Pa/rad": (1e-3 * radians(1.0), "kPa/deg"),
+    "N m/rad": (radians(1.0), "N m/deg"),
     "m": (1e3, "mm"),
     "Pa": (1e-3, "kPa"),
     "Pa/m": (1e-6, "kPa/mm"),
@@ -37,6 +46,15 @@ class Quantity:
     expected: float | None = None
 
     @property
+    def own_name(self) -> str:
+        """What it is called in files: by the units of what it was measured on.
+
+        >>> Quantity("travel_m", "travel", "rad", Figure(1.57)).own_name
+        'travel_rad'
+        """
+        return ROTARY.own(self.name) if self.unit in TURNED.values() else self.name
+
+    @property
     def shown(self) -> str:
         """The value with its +- in the unit people use, or why there is none."""
         if self.figure.value is None:
@@ -57,7 +75,7 @@ class Quantity:
 
 @dataclass(frozen=True, slots=True)
 class Curve:
-    """A line of the picture: Pa or s over m, as the picture says."""
+    """A line of the picture."""
 
     name: str
     x: Column
@@ -72,6 +90,13 @@ class Picture:
     x: str
     y: str
     curves: tuple[Curve, ...]
+
+    @classmethod
+    def of_travel(cls, kind: Kind, curves: Iterable[Curve]) -> Self:
+        """Return the picture of travels, m, over commands, Pa, in the units that people read."""
+        command, length = kind.command.read, kind.length
+        scaled = (replace(each, x=command.factor * each.x, y=length.factor * each.y) for each in curves)
+        return cls(f"command, {command.unit}", f"travel, {length.unit}", tuple(scaled))
 
     def draw(self, axes: "Axes") -> None:
         """Draw the curves on axes of matplotlib."""
@@ -96,6 +121,13 @@ class Outcome(Result):
     notes: tuple[str, ...] = ()
     tables: tuple[Table, ...] = ()
     picture: Picture | None = field(default=None, compare=False)
+
+    def of(self, kind: Kind) -> Self:
+        """Return it in the units of the valve that it was measured on."""
+        if not kind.turns:
+            return self
+        turned = (replace(each, unit=TURNED.get(each.unit, each.unit)) for each in self.quantities)
+        return replace(self, quantities=tuple(turned))
 
     @property
     def passed(self) -> bool:
@@ -136,7 +168,7 @@ class Outcome(Result):
     def frame_columns(self) -> Mapping[str, list[object]]:
         """Return a row a figure."""
         return {
-            "name": [each.name for each in self.quantities],
+            "name": [each.own_name for each in self.quantities],
             "unit": [each.unit for each in self.quantities],
             "value": [each.figure.value for each in self.quantities],
             "plus_minus": [each.figure.plus_minus for each in self.quantities],
@@ -151,7 +183,7 @@ class Outcome(Result):
             "verdicts": [{"code": int(each), "name": each.name, "text": each.text} for each in self.verdicts],
             "passed": self.passed,
             "figures": {
-                each.name: {
+                each.own_name: {
                     "text": each.text,
                     "unit": each.unit,
                     "value": each.figure.value,

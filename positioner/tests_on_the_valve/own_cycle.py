@@ -9,7 +9,8 @@ from dataclasses import replace
 import numpy as np
 
 from config.codes import ExperimentState
-from config.recording import Recording
+from config.drive import VALVE, Kind
+from config.recording import Recording, of_kind
 from positioner.daemon.cycle import Cycle
 from positioner.daemon.recorder import COLUMNS, Row
 from positioner.tests_on_the_valve.program import PLAYED, Played, Program
@@ -20,8 +21,9 @@ class Rows:
 
     unrecorded = 0
 
-    def __init__(self) -> None:
+    def __init__(self, kind: Kind) -> None:
         self._rows: list[Row] = []
+        self._said = of_kind(kind)
 
     def offer(self, row: Row) -> None:
         """Take a row."""
@@ -33,7 +35,7 @@ class Rows:
         if not rows:
             return None
         columns = np.array(rows, dtype=np.float64).T
-        return Recording(dict(zip(COLUMNS, columns, strict=False)))
+        return Recording(dict(zip(COLUMNS, columns, strict=False)), self._said)
 
 
 class OwnCycle:
@@ -42,12 +44,13 @@ class OwnCycle:
     Args:
         cycle: in automatic, with consent.
         turn: has it run once; `cycle.once` in virtual time, `cycle.turn` on a clock.
+        kind: of the valve.
     """
 
-    def __init__(self, cycle: Cycle, turn: Callable[[], None] | None = None) -> None:
+    def __init__(self, cycle: Cycle, turn: Callable[[], None] | None = None, kind: Kind = VALVE) -> None:
         self.cycle = cycle
         self._turn = turn or cycle.once
-        self._rows = Rows()
+        self._rows = Rows(kind)
         cycle.recorder = self._rows
 
     def command_pa(self) -> float:

@@ -162,7 +162,7 @@ def partial_stroke(
     ]
     notes = [f"broken off: {played.problem}"] if broken_off else []
     if tolerance > asked.start * stroke_m:
-        notes.append(f"the noise makes {1e3 * tolerance:.3g} mm of the start tolerance")
+        notes.append(f"the noise makes {recording.kind.length.said(tolerance)} of the start tolerance")
     after = rest_after(recording)
     if after is not None and not broken_off and abs(after.position_m - rest.position_m) > tolerance:
         notes.append("the stem is not quite where it was: friction holds it, and the law takes it back")
@@ -177,7 +177,7 @@ def partial_stroke(
         tuple(dict.fromkeys(verdicts)) or (ValveTestVerdict.PASSED,),
         tuple(notes),
         picture=_picture(recording),
-    )
+    ).of(recording.kind)
 
 
 def _abort(state: ExperimentState) -> ValveTestVerdict:
@@ -243,7 +243,7 @@ def _figures(
         Quantity("breakout_s", "time to the break-out", "s", out_s),
         Quantity("reached_m", "travel reached", "m", travel, asked.travel * stroke_m),
         Quantity("stroke_s", "time from the break-out to the travel", "s", within),
-        Quantity("friction_at_rate_pa", "friction over the area, lag and all", "Pa", friction),
+        Quantity("friction_at_rate_pa", "friction as a pressure, lag and all", "Pa", friction),
         Quantity("back_m", "back at, from where it was", "m", off),
         Quantity("noise_m", "noise at rest", "m", Figure(rest.noise_m)),
     ]
@@ -308,5 +308,4 @@ def _judged(now: dict[str, Figure], then: dict[str, Figure]) -> Iterator[str]:
 
 
 def _picture(recording: Recording) -> Picture:
-    curve = Curve("there and back", 1e-3 * recording.command_pa, 1e3 * recording.position_m)
-    return Picture("command, kPa", "travel, mm", (curve,))
+    return Picture.of_travel(recording.kind, (Curve("there and back", recording.command_pa, recording.position_m),))

@@ -26,6 +26,7 @@ from math import hypot, sqrt
 import numpy as np
 
 from config.codes import ValveTestVerdict
+from config.drive import VALVE, Kind
 from config.errors import InputError
 from config.recording import Column, Recording
 from config.results.block import Table
@@ -61,11 +62,15 @@ SUPPLY_LACKING = 0.05
 
 @dataclass(frozen=True, slots=True)
 class Nameplate:
-    """What is known of the valve before: m, and m^2 where the area is known."""
+    """What is known of the valve before: m, and where it is known its force over its pressure, m^2.
+
+    Of a valve that turns: rad, and its torque over its pressure, N m/Pa.
+    """
 
     valve: str
     stroke_m: float
     area_m2: float | None = None
+    kind: Kind = VALVE
 
 
 def programmes(bounds: Bounds, start_pa: float, source: str = "experiment") -> tuple[Program, ...]:
@@ -99,6 +104,8 @@ def signature(recordings: "list[Recording]", plate: Nameplate) -> Outcome:
     """Return the signature that recordings of ramps show; whatever they do not show says why."""
     legs = [leg for recording in recordings for leg in legs_of(recording)]
     ramps = ramps_of(legs)
+    if recordings:
+        plate = replace(plate, kind=recordings[0].kind)
     if not ramps.lines:
         return _without_motion(recordings, legs, plate)
     low, high = ramps.low_m, ramps.high_m
@@ -115,6 +122,7 @@ def signature(recordings: "list[Recording]", plate: Nameplate) -> Outcome:
         *_friction(ramps, plate, x_0, x_1),
         *_bench_set(ramps, plate, x_0, x_1, float(min(np.min(each.command_pa) for each in legs))),
         *_bands(ramps, x_0, x_1),
+        Quantity("rate_pa_per_s", "slowest rate", "Pa/s", Figure(ramps.rates_pa_per_s[0])),
         Quantity("noise_m", "noise about the lines", "m", Figure(ramps.noise_m)),
     ]
     return Outcome(
@@ -124,8 +132,8 @@ def signature(recordings: "list[Recording]", plate: Nameplate) -> Outcome:
         verdict,
         (*notes, *told),
         (_over_travel(ramps, plate, x_0, x_1),),
-        _picture(ramps),
-    )
+        _picture(ramps, plate.kind),
+    ).of(plate.kind)
 
 
 def _without_motion(recordings: "list[Recording]", legs: list[Leg], plate: Nameplate) -> Outcome:
@@ -158,8 +166,8 @@ def _verdict(travel: Figure, plate: Nameplate) -> tuple[tuple[ValveTestVerdict, 
     off_m = abs(travel.value - plate.stroke_m)
     if off_m > max(STROKE_WRONG * plate.stroke_m, travel.plus_minus or 0.0):
         told = (
-            f"valve.stroke_m says {1e3 * plate.stroke_m:.4g} mm, the stem travels {1e3 * travel.value:.4g} mm: "
-            "one of them is wrong"
+            f"the file says {plate.kind.length.said(plate.stroke_m, '.4g')}, the stem travels "
+            f"{plate.kind.length.said(travel.value, '.4g')}: one of them is wrong"
         )
         return (ValveTestVerdict.STROKE_DIFFERS,), [told]
     return (ValveTestVerdict.PASSED,), []
@@ -224,7 +232,7 @@ def _bench_set(ramps: Ramps, plate: Nameplate, x_0: float, x_1: float, least_pa:
         Quantity("bench_high_pa", "bench set, upper end", "Pa", high),
         Quantity("opens_at_pa", "leaves the lower end at", "Pa", ups[0]),
         Quantity("closes_at_pa", "is back on it at", "Pa", downs[0]),
-        Quantity("seat_load_pa", "seat load at the least command, over the area", "Pa", seat),
+        Quantity("seat_load_pa", "seat load at the least command, as a pressure", "Pa", seat),
         *_force("seat_load_n", "seat load", "N", seat, plate),
     ]
 
@@ -310,13 +318,13 @@ def _over_travel(ramps: Ramps, plate: Nameplate, x_0: float, x_1: float) -> Tabl
     still = difference(ramps.at_no_rate(1, half), ramps.at_no_rate(-1, half), 0.5)
     slow = difference(ramps.at_slowest(1, half), ramps.at_slowest(-1, half), 0.5)
     lag_pa = 0.0 if still.value is None or slow.value is None else slow.value - still.value
-    rows = []
+    rows, unit = [], plate.kind.force.si
     for share in DECILES:
         found = _friction_at(ramps, x_0 + share * (x_1 - x_0), 0.1 * (x_1 - x_0), lag_pa)
         shown = Quantity("", "", "Pa", found).shown
-        force = "" if plate.area_m2 is None else Quantity("", "", "N", _scaled(found, plate.area_m2)).shown
+        force = "" if plate.area_m2 is None else Quantity("", "", unit, _scaled(found, plate.area_m2)).shown
         rows.append((f"{100 * share:.0f} %", shown, *((force,) if plate.area_m2 is not None else ())))
-    headings = ("travel", "friction / area", *(("friction",) if plate.area_m2 is not None else ()))
+    headings = ("travel", "friction, as a pressure", *(("friction",) if plate.area_m2 is not None else ()))
     return Table(headings, rows, "friction over travel, at the slowest rate less its lag")
 
 
@@ -340,17 +348,17 @@ def _friction_at(ramps: Ramps, middle_m: float, width_m: float, lag_pa: float) -
     return Figure(value, TWO_SIGMA * 0.5 * hypot(told[1][1], told[-1][1]))
 
 
-def _picture(ramps: Ramps) -> Picture:
+def _picture(ramps: Ramps, kind: Kind) -> Picture:
     curves = []
     for way, name in ((1, "up"), (-1, "down")):
         lines = ramps.slowest(way)
         if lines:
             leg = lines[0].leg
-            curves.append(Curve(name, 1e-3 * leg.command_pa, 1e3 * leg.position_m, points=True))
+            curves.append(Curve(name, leg.command_pa, leg.position_m, points=True))
     for way, name in ((1, "line up"), (-1, "line down")):
         for line in ramps.slowest(way)[:1]:
             p = np.array([np.min(line.leg.command_pa), np.max(line.leg.command_pa)])
             x = np.clip(line.slope * p + line.level, *np.quantile(line.leg.position_m, (0.02, 0.98)))
             ends = (x - line.level) / line.slope
-            curves.append(Curve(name, 1e-3 * ends, 1e3 * x))
-    return Picture("command, kPa", "travel, mm", tuple(curves))
+            curves.append(Curve(name, ends, x))
+    return Picture.of_travel(kind, curves)

@@ -103,15 +103,17 @@ def small_steps(recording: Recording, valve: str, stroke_m: float, slope_pa_per_
         verdict = ValveTestVerdict.UNDETERMINED
     else:
         verdict = ValveTestVerdict.PASSED
+    kind, since_s = recording.kind, recording.time_s - recording.time_s[0]
+    travel, command = kind.length, kind.command.read
     picture = Picture(
         "time, s",
-        "travel, mm; command, kPa",
+        f"travel, {travel.unit}; command, {command.unit}",
         (
-            Curve("travel", recording.time_s - recording.time_s[0], 1e3 * recording.position_m),
-            Curve("command", recording.time_s - recording.time_s[0], 1e-3 * recording.command_pa),
+            Curve("travel", since_s, travel.factor * recording.position_m),
+            Curve("command", since_s, command.factor * recording.command_pa),
         ),
     )
-    return Outcome(TEST, valve, tuple(quantities), (verdict,), tuple(response.notes), picture=picture)
+    return Outcome(TEST, valve, tuple(quantities), (verdict,), tuple(response.notes), picture=picture).of(kind)
 
 
 def _in_steps(command_pa: Column) -> Column:

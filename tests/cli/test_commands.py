@@ -217,7 +217,7 @@ def test_words_that_no_command_takes_are_one_line(
         (["set", "mode", "auto"], "mode: allowed is a number, hold, manual, automatic, got 'auto'"),
         (
             ["simulate", "none", "--input", "x.csv", "-o", "y.csv"],
-            "none: no shipped valve of that name; there are: ordinary, seed",
+            "none: no shipped valve of that name; there are: ordinary, rotary, seed",
         ),
     ],
 )

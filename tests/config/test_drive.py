@@ -104,7 +104,7 @@ def test_a_valves_command_is_no_force() -> None:
         (
             "rotary motor",
             "spinning",
-            "drive.kind: must be linear, linear motor, rotary or rotary motor, got 'spinning'",
+            "drive.kind: must be linear, linear motor, rotary, rotary motor or rotary valve, got 'spinning'",
         ),
         ("static_nm = 0.031", "static_nm = 0.01", "static_nm must be at least coulomb_nm (0.03 N m), it is 0.01 N m"),
         ("coulomb_nm = 0.03\n", "", "drive.coulomb_nm: is required and missing"),

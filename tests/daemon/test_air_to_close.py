@@ -105,11 +105,6 @@ def test_what_was_learnt_with_air_to_open_is_not_taken_for_one_that_air_closes()
     assert not opens.items() - closes.items()
 
 
-def test_degrees_are_refused_with_what_to_write_in_their_place() -> None:
-    with pytest.raises(InputError, match=r"^site\.toml: valve\.travel_deg: a rotary valve .* write stroke_m"):
-        validated(DaemonFile, {"valve": {"stroke_m": 0.04, "travel_deg": 90.0}}, "site.toml")
-
-
 @pytest.mark.parametrize(("actuator", "needed"), [("double_acting", "a second pressure"), ("booster", "its rates")])
 def test_an_actuator_that_is_not_positioned_is_refused_with_what_would_be_needed(actuator: str, needed: str) -> None:
     with pytest.raises(InputError, match=rf"^site\.toml: valve\.actuator: is not positioned: .*{needed}"):

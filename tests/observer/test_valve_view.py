@@ -22,6 +22,7 @@ class Polled:
         self.view = ValveView("FV-101", STROKE_M, POLL_S)
         self.time_s = 0.0
         self.values = dict.fromkeys(BY_NAME, 0.0) | {"mode": Mode.AUTOMATIC, "period": 1e-3, "position_m": 0.05}
+        self.values["position_deg"] = math.nan
 
     def poll(self, seconds: float, **values: float) -> None:
         self.values |= values

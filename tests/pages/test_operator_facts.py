@@ -28,6 +28,7 @@ from positioner.pages.parts.units import LENGTHS, Units
 
 STROKE_M = 0.1
 VALUES = dict.fromkeys(BY_NAME, 0.0) | {
+    "position_deg": math.nan,
     "mode": Mode.AUTOMATIC,
     "state": State.S1_UP,
     "position_m": 0.05,
@@ -198,7 +199,7 @@ def test_a_window_keeps_its_extremes_and_its_gaps() -> None:
 
 
 def test_a_role_ends_by_itself() -> None:
-    from positioner.pages.operator_page.controls import SIGNED_IN_S, SignedIn  # the page's library, with it
+    from positioner.pages.operator_page.signed_in import SIGNED_IN_S, SignedIn  # the page's library, with it
 
     signed = SignedIn()
     assert signed.at(0.0) is Role.OBSERVER

@@ -40,5 +40,5 @@ def test_what_the_tables_may_not_say_fails_the_test_in_one_line(tmp_path: Path) 
     lines = [line for line in done.stdout.splitlines() if line.startswith("valve_slave: ")]
     assert len(lines) == 2, done.stdout
     assert "clock.mode: Input should be 'real_time' or 'lockstep', got 'fast'" in lines[0]
-    assert "by name there are: ordinary, seed" in lines[1]
+    assert "by name there are: ordinary, rotary, seed" in lines[1]
     assert "Traceback" not in done.stdout + done.stderr

@@ -16,7 +16,7 @@ from positioner.tests_on_the_valve.kept_records import folder_of, keep, records
 from positioner.tests_on_the_valve.outcome import Outcome, Quantity
 from positioner.tests_on_the_valve.signature import signature
 from tests.tests_on_the_valve.test_signature import PLATE, TIGHT, recorded
-from tests.tests_on_the_valve.virtual_valve import STROKE_M, told
+from tests.tests_on_the_valve.virtual_valve import STROKE_M, daemon_file, told
 
 WORN = told(coulomb_n=800.0, static_n=880.0)
 STROKES = Outcome(
@@ -28,7 +28,7 @@ STROKES = Outcome(
     ),
     (ValveTestVerdict.PASSED,),
 )
-LAW = {"b_over_c_pa_per_m": -2e6, "k_over_c_pa": -6000.0, "offset_pa": 20e3}
+LAW: dict[str, float] = {"b_over_c_pa_per_m": -2e6, "k_over_c_pa": -6000.0, "offset_pa": 20e3}
 CONFIGURATION = {"valve": {"name": "FV-1", "stroke_m": STROKE_M}, "law": LAW}
 SITE = f"[valve]\nname = 'FV-1'\nstroke_m = {STROKE_M}\n[law]\nb_over_c_pa_per_m = -2e6\nk_over_c_pa = -6000.0\n"
 
@@ -138,11 +138,11 @@ def test_a_report_of_what_was_found_alone_has_one_column(tmp_path: Path) -> None
 
 
 def test_what_the_file_says_is_recommended() -> None:
-    assert recommended_by(CONFIGURATION) == {
+    assert recommended_by(daemon_file(law=LAW)) == {
         "travel_m": STROKE_M,
         "spring_pa_per_m": 2e6,
         "friction_pa": 6000.0,
         "bench_low_pa": 20e3,
         "bench_high_pa": pytest.approx(100e3),
     }
-    assert recommended_by({}) == {}
+    assert recommended_by(daemon_file()) == {"travel_m": STROKE_M}

@@ -101,7 +101,7 @@ def test_one_that_is_broken_off_by_ctrl_c_is_kept_as_no_reference(site: Path, mo
 @pytest.mark.parametrize(
     ("words", "said"),
     [
-        (["cst", "--rate", "0.01", "--start", "0.002"], "break-away friction over the area"),
+        (["cst", "--rate", "0.01", "--start", "0.002"], "break-away friction, as a pressure"),
         (["steps", "--held-s", "0.3"], "resolution, of the span"),
     ],
     ids=["continuous stroke", "steps"],
@@ -119,9 +119,3 @@ def test_the_others_pass_and_print_their_figures(
 def test_steps_of_a_stem_at_its_end_are_refused(site: Path, capsys: pytest.CaptureFixture[str]) -> None:
     assert main(["steps", str(site)]) == 1
     assert "the stem is at an end, where steps move nothing" in capsys.readouterr().err
-
-
-def test_a_signature_is_played_and_compared(site: Path, capsys: pytest.CaptureFixture[str]) -> None:
-    assert main(["signature", str(site), "--keep", "factory", "--area-m2", str(AREA_M2)]) == 0
-    assert main(["signature", str(site)]) == 0
-    assert "nothing has changed since the factory of" in capsys.readouterr().out

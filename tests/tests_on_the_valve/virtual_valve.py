@@ -61,13 +61,14 @@ class VirtualValve(OwnCycle):
         faults: tuple[DeviceFault, ...] = (),
         changes: tuple[Change, ...] = (),
         action: ActionWord = "air_to_open",
+        maximum_pa: float = MAXIMUM_PA,
     ) -> None:
         self.file = file or daemon_file()
         slave = SlaveFile(
             clock=SlaveClock(mode="lockstep", period_s=PERIOD_S),
-            sensor=Sensor(noise_std_m=noise * STROKE_M, seed=seed),
+            sensor=Sensor(noise_std_m=noise * valve.valve.stroke_m, seed=seed),
             initial=initial,
-            supply=Supply(maximum_pa=MAXIMUM_PA),
+            supply=Supply(maximum_pa=maximum_pa),
             action=action,
             fault=faults,
             change=changes,
@@ -75,7 +76,7 @@ class VirtualValve(OwnCycle):
         stem = Valve.from_file(valve, step_s=FINE_STEP_S)
         stem.rest_at(initial.position_m, initial.pressure_pa)
         self.device = Device(stem, slave, valve.valve.model_dump(exclude={"name", "kind"}))
-        super().__init__(cycle_of(self.file, self.device))
+        super().__init__(cycle_of(self.file, self.device), kind=valve.valve.own)
 
 
 def cycle_of(file: DaemonFile, device: Plant) -> Cycle:

@@ -84,7 +84,7 @@ class RunningValve:
     def stem_m(self) -> float:
         """Return where the stem is, m, as recordings have it: more air, more of it."""
         with _dcs(self._arguments) as dcs:
-            return self._file.valve.travel.turned_m(float(dcs.get("position_m")))
+            return self._file.valve.travel.stem_m(float(dcs.get("position")))
 
     def slope_pa_per_m(self) -> float | None:
         """Return the spring rate over the area that the law works with, Pa/m; None while it knows none."""
@@ -105,7 +105,8 @@ class RunningValve:
 
         within_s = 2.0 * self._file.experiment.limit_s + RECORDED_WITHIN_S
         with _dcs(self._arguments) as dcs:
-            state = dcs.play(program.points, within_s, turn_m=program.turn_m, band_m=program.band_m)
+            turn, band = (each / self._file.valve.stroke_m for each in (program.turn_m, program.band_m))
+            state = dcs.play(program.points, within_s, turn=turn, band=band)
             problem = "" if state in PLAYED else why_not(state, dcs)
         points = program.points if state is ExperimentState.COMPLETE else ()
         recording = recorded(self._folder, self._file.valve.name, points)

@@ -62,7 +62,7 @@ def own_valve(file: "DaemonFile", source: Path) -> "Iterator[OwnCycle]":
         cycle = Cycle(link, controller, pace, asked, None)
         on_exit.callback(lambda: link.leave(controller.left_pa, holds=True))
         cycle.prepare()
-        yield OwnCycle(cycle, cycle.turn)
+        yield OwnCycle(cycle, cycle.turn, file.valve.kind)
 
 
 def require_no_daemon(file: "DaemonFile") -> None:

@@ -86,6 +86,7 @@ def places_in(
                 history=None if file.history is None else path.parent / file.history.folder,
                 range_pa=(file.pressure.minimum_pa, file.pressure.maximum_pa),
                 settings=file,
+                file=path,
             )
 
 

@@ -11,6 +11,7 @@ from positioner.cli.parts.output_files import writable, write_json
 
 if TYPE_CHECKING:
     from config.daemon_file import DaemonFile
+    from config.drive import Kind
     from config.recording import Recording
     from positioner.control.played_experiment import ExperimentLimits
     from positioner.tests_on_the_valve.kept_records import Record
@@ -32,6 +33,9 @@ def add_test_arguments(parser: argparse.ArgumentParser, *, recordings: bool = Tr
         )
         parser.add_argument("--stroke-m", type=float, metavar="M", help="with --rec and without a file: the stroke")
     parser.add_argument("--area-m2", type=float, metavar="M2", help="of the diaphragm: forces in newtons as well")
+    parser.add_argument(
+        "--torque-nm-per-pa", type=float, metavar="NM_PER_PA", help="of a rotary valve's actuator: torques as well"
+    )
     parser.add_argument("--keep", choices=KINDS, help="keep the outcome in the valve's history as this")
     parser.add_argument("--against", choices=KINDS, help="compare with the newest that is kept as this")
     parser.add_argument("--json", type=Path, metavar="FILE", help="write verdict and figures as JSON")
@@ -56,7 +60,7 @@ def checked(arguments: argparse.Namespace) -> "DaemonFile | None":
 
     writable(arguments.json, "--json")
     writable(arguments.picture, "--picture")
-    for option in ("area_m2", "stroke_m"):
+    for option in ("area_m2", "torque_nm_per_pa", "stroke_m"):
         value = getattr(arguments, option, None)
         if value is not None and not 0.0 < value < 1e6:
             raise InputError(f"--{option.replace('_', '-')}", f"allowed is a positive number, got {value:g}")
@@ -65,7 +69,13 @@ def checked(arguments: argparse.Namespace) -> "DaemonFile | None":
         raise InputError("CONFIG.toml", f"is required, once; {len(given)} were given")
     if given:
         arguments.config = given[0]
-        return load_daemon(given[0], arguments.name)
+        file = load_daemon(given[0], arguments.name)
+        turns = file.valve.kind.turns
+        if (arguments.area_m2 if turns else arguments.torque_nm_per_pa) is not None:
+            wrong, right = ("--area-m2", "--torque-nm-per-pa")[:: 1 if turns else -1]
+            raise InputError(wrong, f"{file.valve.name} {'turns' if turns else 'has a stem'}: allowed is {right}")
+        arguments.area_m2 = arguments.torque_nm_per_pa or arguments.area_m2
+        return file
     if arguments.stroke_m is None:
         raise InputError("--stroke-m", "is required with --rec where no CONFIG.toml says the stroke")
     if arguments.keep or arguments.against:
@@ -228,8 +238,20 @@ def kept(outcome: "Outcome", file: "DaemonFile", arguments: argparse.Namespace, 
 
 
 def configured(file: "DaemonFile") -> dict[str, Any]:
-    """Return what of a daemon's file is kept with a record: tables by name."""
-    return file.model_dump(mode="json", include={"valve", "device", "pressure", "experiment", "law", "control"})
+    """Return what of a daemon's file is kept with a record: tables by name, as they are written."""
+    tables = file.model_dump(mode="json", include={"valve", "device", "pressure", "experiment", "law", "control"})
+    other_length = "travel_deg" if file.valve.length == "stroke_m" else "stroke_m"
+    tables["valve"] = {key: value for key, value in tables["valve"].items() if key != other_length}
+    return {name: _as_written(file.valve.kind, table) for name, table in tables.items()}
+
+
+def _as_written(kind: "Kind", table: Any) -> Any:
+    from config.drive import as_written
+
+    if not isinstance(table, dict):
+        return table
+    told = (as_written(kind, key, value) for key, value in table.items())
+    return {key: _as_written(kind, value) for key, value in told}
 
 
 def draw(outcome: "Outcome", path: Path) -> None:

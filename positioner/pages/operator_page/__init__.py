@@ -12,6 +12,9 @@ Its files:
     recorded_plot           the last minutes as recorded, to zoom into
     friction_plot           friction against its baseline, a row a minute
     controls                signing in; mode, reference, pressure, identification, acknowledgement
+    signed_in               which role is in front of a tab
+    alarm_card              the alarms: seen, shelved
+    test_card               tests on the valve: begun with consent, broken off, reported
     moves_ahead, question   what a command is going to do, and the question before it is given
     facts                   what is said of a valve, a line each
 """

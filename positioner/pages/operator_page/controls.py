@@ -1,11 +1,7 @@
-"""Signing in, and what a role may then do to a valve. Rights, permissives and confirmations come from `ValveCommands`.
-
-A role holds for one tab, and for `SIGNED_IN_S` after its last command.
-"""
+"""Signing in, and what a role may then do to a valve; rights and confirmations come from `ValveCommands`."""
 
 import time
 from collections.abc import Callable
-from dataclasses import dataclass
 
 from nicegui import ui
 
@@ -23,32 +19,14 @@ from positioner.observer.waiting_reference import reference_writer
 from positioner.observer.watched_valves import WatchedValve
 from positioner.pages.operator_page.moves_ahead import Ahead
 from positioner.pages.operator_page.question import Answer, Question
+from positioner.pages.operator_page.signed_in import SignedIn
 from positioner.pages.parts.number_field import NumberField
 from positioner.pages.parts.page_words import in_page_words
 from positioner.pages.parts.telling import aside, heading
 from positioner.pages.parts.units import Units
 
-SIGNED_IN_S = 900.0
 NO_PASSWORDS = "Nobody can sign in: the page was started without --roles FILE."
 YES, NO = "check_circle", "radio_button_unchecked"
-
-
-@dataclass(slots=True)
-class SignedIn:
-    """Which role the person in front of a tab has, and until when, s; an observer's never ends."""
-
-    role: Role = Role.OBSERVER
-    until_s: float = 0.0
-
-    def at(self, now_s: float) -> Role:
-        """Return the role at a time, on the monotonic clock."""
-        if now_s >= self.until_s:
-            self.role = Role.OBSERVER
-        return self.role
-
-    def begin(self, role: Role, now_s: float) -> None:
-        """Take a role, or keep it for longer."""
-        self.role, self.until_s = role, now_s + SIGNED_IN_S
 
 
 class Door:
@@ -198,7 +176,7 @@ class Controls:
         self._parts += [(self._pressure, ("manual_pressure", "mode")), (button, ("manual_pressure", "mode"))]
 
     def _acknowledge_row(self) -> None:
-        button = ui.button("Acknowledge the fault", on_click=lambda: self._do(self._acknowledge))
+        button = ui.button("Acknowledge the fault", on_click=lambda: self.do(self._acknowledge))
         self._parts.append((button.props('no-caps outline dense data-testid="acknowledge"'), ("acknowledge",)))
 
     def _identify_rows(self) -> None:
@@ -227,7 +205,7 @@ class Controls:
         if reference is None:
             self._tell("✗ reference: type a number")
             return
-        await self._do(self._valve.commands.set_reference, reference / 100)
+        await self.do(self._valve.commands.set_reference, reference / 100)
 
     async def _chosen(self, mode: Mode) -> None:
         """Ask before a mode in which the valve may move; hold moves nothing."""
@@ -236,14 +214,14 @@ class Controls:
         elif mode is Mode.MANUAL:
             self._ask_manual()
         else:
-            await self._do(self._valve.commands.set_mode, mode)
+            await self.do(self._valve.commands.set_mode, mode)
 
     async def _ask_automatic(self) -> None:
         ahead = await aside(self._ahead)
         seen_pu = ahead.picture.value("reference")
 
         async def automatic(goes: bool) -> None:
-            await self._do(lambda role: self._valve.commands.automatic(role, seen_pu, goes=goes))
+            await self.do(lambda role: self._valve.commands.automatic(role, seen_pu, goes=goes))
 
         stay = Answer(f"Stay at {ahead.stands}" if ahead.waits else "Automatic", "stay", lambda: automatic(False))
         go = Answer(f"Go to {ahead.waits}", "go", lambda: automatic(True))
@@ -263,7 +241,7 @@ class Controls:
         pressure_pa = ahead.picture.value("command") if typed is None else typed / unit.per_si
 
         async def manual() -> None:
-            await self._do(lambda role: self._valve.commands.manual(role, pressure_pa))
+            await self.do(lambda role: self._valve.commands.manual(role, pressure_pa))
 
         answers = [Answer(f"Command {unit.text(pressure_pa)}", "manual", manual)]
         self._question.ask("Manual: the pressure is commanded by hand", ahead.manual(pressure_pa), answers)
@@ -272,7 +250,7 @@ class Controls:
         ahead = await aside(self._ahead)
 
         async def identify() -> None:
-            await self._do(self._identified)
+            await self.do(self._identified)
 
         answers = [Answer("Identify", "identify", identify)]
         self._question.ask("Identify: the valve moves", ahead.identification(), answers)
@@ -294,7 +272,7 @@ class Controls:
 
         return self._valve.commands.identify(role, {}, show)
 
-    async def _do(self, command: Callable[..., Confirmation], *arguments: object) -> None:
+    async def do(self, command: Callable[..., Confirmation], *arguments: object) -> None:
         """Have a command done by a thread, and say what the daemon reads back."""
         if self._busy:
             return

@@ -34,7 +34,7 @@ NE107_LETTER = {
 
 def figures(picture: ValvePicture, stroke_m: float, units: Units) -> dict[str, str]:
     """Return the figures that are read from afar, by register; a measurement that is old is none."""
-    position, pressure = units.position_unit(stroke_m), units.pressure
+    position, pressure = units.position_unit(stroke_m, turns=picture.turns), units.pressure
     measured = picture.value if picture.freshness.measured_live else (lambda _: math.nan)
     return {
         "reference": position.text(picture.value("reference_in_force") * stroke_m),
@@ -49,7 +49,8 @@ def waiting(picture: ValvePicture, stroke_m: float, units: Units) -> str:
     reference_pu = waiting_reference(picture.values)
     if reference_pu is None:
         return ""
-    return f"waits: {units.position_unit(stroke_m).text(reference_pu * stroke_m)}, followed in automatic"
+    unit = units.position_unit(stroke_m, turns=picture.turns)
+    return f"waits: {unit.text(reference_pu * stroke_m)}, followed in automatic"
 
 
 def status(picture: ValvePicture) -> list[Fact]:

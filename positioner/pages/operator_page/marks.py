@@ -49,6 +49,8 @@ LAYOUT = """
 .faulty { color: #b3261e; } .body--dark .faulty { color: #ff8a80; }
 .facts { display: grid; grid-template-columns: fit-content(50%) 1fr; gap: 2px 16px; margin: 0; width: 100%; }
 .facts dt { opacity: 0.75; } .facts dd { margin: 0; text-align: right; overflow-wrap: anywhere; }
+.verbatim { white-space: pre; font: 12px/1.4 monospace; }
+.alarm-row { border-top: 1px solid rgba(128,136,150,0.35); padding: 8px 0; } .unseen { font-weight: 700; }
 .scrolling { overflow-x: auto; } .scrolling p { margin: 4px 0; }
 .scrolling table { border-collapse: collapse; margin: 8px 0; font-variant-numeric: tabular-nums; }
 .scrolling table td, .scrolling table th { padding: 2px 12px 2px 0; white-space: nowrap; }

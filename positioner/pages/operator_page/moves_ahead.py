@@ -142,10 +142,10 @@ class Ahead:
         return "no move has been seen lately"
 
     def _position(self, position_pu: float) -> str:
-        return self.units.position_unit(self.stroke_m).text(position_pu * self.stroke_m)
+        return self.units.position_unit(self.stroke_m, turns=self.picture.turns).text(position_pu * self.stroke_m)
 
     def _length(self, part: float) -> str:
         """Return a part of the stroke as a length, in brackets; empty where the stroke is not known."""
         if not math.isfinite(self.stroke_m):
             return ""
-        return f" ({self.units.length_unit().text(abs(part) * self.stroke_m)})"
+        return f" ({self.units.length_unit(turns=self.picture.turns).text(abs(part) * self.stroke_m)})"

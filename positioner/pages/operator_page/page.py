@@ -14,9 +14,10 @@ from nicegui import app, ui
 
 from config.passwords import SignIn
 from positioner.observer.watched_valves import Place, WatchedValve, watching
-from positioner.pages.operator_page.controls import Door, SignedIn
+from positioner.pages.operator_page.controls import Door
 from positioner.pages.operator_page.marks import STYLE, SignOfLife
 from positioner.pages.operator_page.overview import Overview
+from positioner.pages.operator_page.signed_in import SignedIn
 from positioner.pages.operator_page.valve_panel import ValvePanel
 from positioner.pages.parts.server import Listening, serve
 from positioner.pages.parts.telling import aside
@@ -45,7 +46,7 @@ def serve_valves(places: Sequence[Place], where: Listening, sign_in: SignIn | No
 
         async def end() -> None:
             """Give the laws their command back: the process is gone right after this."""
-            await asyncio.gather(*(aside(valve.commands.end) for valve in valves))
+            await asyncio.gather(*(aside(valve.end) for valve in valves))
 
         app.on_shutdown(end)
         serve(TITLE, build, where, opens_browser=opens_browser)

@@ -29,7 +29,7 @@ class RecordedPlot:
         self._theme = theme
         self._units = units
         self._columns: dict[str, Column] = {}
-        self._stroke_m = math.nan
+        self._stroke_m, self._turns = math.nan, False
         self._unit = Unit("", 1.0, 0)
         self._chart = ui.echart({}).classes("full-width").style("height: 240px")
         self._chart.props('data-testid="recorded" role="img" aria-label="the last minutes as recorded"')
@@ -41,7 +41,7 @@ class RecordedPlot:
         """Show a recording, all of it."""
         nothing = np.full(len(recording), math.nan)
         self._columns = {"time_s": recording.time_s} | {name: recording.columns.get(name, nothing) for name in COLUMNS}
-        self._stroke_m = stroke_m
+        self._stroke_m, self._turns = stroke_m, recording.kind.turns
         self._chart.set_visibility(True)
         self.redraw()
 
@@ -49,7 +49,7 @@ class RecordedPlot:
         """Draw it in the colours and the units that are chosen now, if there is anything to draw."""
         if self._chart.is_deleted or not self._columns:
             return
-        self._unit = self._units.position_unit(self._stroke_m)
+        self._unit = self._units.position_unit(self._stroke_m, turns=self._turns)
         self._chart.options.clear()
         self._chart.options.update(self._whole())
         self._chart.update()

@@ -18,7 +18,7 @@ from positioner.observer.trends import WAITING, bands, thinned
 from positioner.observer.valve_view import ValveView
 from positioner.pages.operator_page.marks import DASHES
 from positioner.pages.parts.theme import Theme
-from positioner.pages.parts.units import Units
+from positioner.pages.parts.units import Unit, Units
 
 Options = dict[str, Any]
 
@@ -137,7 +137,10 @@ class TrendPlot:
         return {name: per_si[each.panel] * rows[each.column] for name, each in LINES.items()}
 
     def _position(self, position_m: Any) -> Any:
-        return self._units.position_unit(self._view.stroke_m).per_si * position_m
+        return self._position_unit().per_si * position_m
+
+    def _position_unit(self) -> Unit:
+        return self._units.position_unit(self._view.stroke_m, turns=self._view.turns)
 
     def _whole(self) -> Options:
         """Return all of it."""
@@ -147,7 +150,7 @@ class TrendPlot:
         hidden = quiet | {"axisLabel": {"show": False}}
         rule = {"splitLine": {"lineStyle": {"color": ink.grid}}}
         places = ({"top": 58, "height": 200}, {"top": 284, "height": 120})
-        units = (self._units.position_unit(self._view.stroke_m).name, self._units.pressure.name)
+        units = (self._position_unit().name, self._units.pressure.name)
         series = [
             {
                 "type": "line",

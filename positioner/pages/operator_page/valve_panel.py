@@ -11,11 +11,14 @@ from positioner.observer.last_moves import LastMoves, last_moves
 from positioner.observer.valve_view import ValvePicture
 from positioner.observer.watched_valves import WatchedValve
 from positioner.pages.operator_page import facts
-from positioner.pages.operator_page.controls import Controls, SignedIn
+from positioner.pages.operator_page.alarm_card import AlarmCard
+from positioner.pages.operator_page.controls import Controls
 from positioner.pages.operator_page.facts import Fact
 from positioner.pages.operator_page.friction_plot import FrictionPlot
 from positioner.pages.operator_page.marks import grey, mark_fault, mark_ne107
 from positioner.pages.operator_page.recorded_plot import RecordedPlot
+from positioner.pages.operator_page.signed_in import SignedIn
+from positioner.pages.operator_page.test_card import TestCard
 from positioner.pages.operator_page.trend_plot import WINDOWS_S, TrendPlot
 from positioner.pages.parts.telling import aside, heading
 from positioner.pages.parts.theme import Theme
@@ -71,8 +74,10 @@ class ValvePanel:
                     self._moves(theme)
                 with ui.element("div").classes("side column before-plots"):
                     self._controls = Controls(valve, signed, units)
+                    self._alarms = AlarmCard(valve.commands, signed, self._controls.do)
                     self._status = FactsCard("Status", "status")
             with ui.element("div").classes("cards"):
+                self._tests = TestCard(valve.place, valve.tests, signed, self._controls.do)
                 self._estimates = FactsCard("Estimates, with 95 % intervals", "estimates")
                 self._wear = FactsCard("Friction and wear", "wear")
                 with self._wear.card:
@@ -102,6 +107,8 @@ class ValvePanel:
         self._cycle.show(facts.cycle(picture))
         self._estimates.show(facts.estimates(picture, self.valve.view.stroke_m, self._units))
         self._controls.show(picture)
+        self._alarms.show(picture)
+        self._tests.show(picture)
 
     def redraw(self) -> None:
         """Draw it in other units."""

@@ -46,6 +46,8 @@ class Unit:
 
 PRESSURES = {each.name: each for each in (Unit("bar", 1e-5, 3), Unit("kPa", 1e-3, 1), Unit("psi", 1 / 6894.757, 2))}
 LENGTHS = {each.name: each for each in (Unit("mm", 1e3, 2), Unit("in", 1 / 0.0254, 3))}
+DEGREES = Unit("deg", math.degrees(1.0), 2)
+"""Of a valve that turns, in the place of a length."""
 PERCENT = "%"
 """Positions as a part of the stroke."""
 POSITIONS = (PERCENT, *LENGTHS)
@@ -58,15 +60,15 @@ class Units:
     position: str = PERCENT
     pressure: Unit = field(default_factory=lambda: PRESSURES["bar"])
 
-    def position_unit(self, stroke_m: float) -> Unit:
-        """Return the unit of positions in m."""
-        if self.position == PERCENT:
-            return Unit(PERCENT, 100 / stroke_m, 2) if math.isfinite(stroke_m) else LENGTHS["mm"]
-        return LENGTHS[self.position]
+    def position_unit(self, stroke_m: float, *, turns: bool = False) -> Unit:
+        """Return the unit of positions in m; in rad of a valve that turns."""
+        if self.position == PERCENT and math.isfinite(stroke_m):
+            return Unit(PERCENT, 100 / stroke_m, 2)
+        return self.length_unit(turns=turns)
 
-    def length_unit(self) -> Unit:
+    def length_unit(self, *, turns: bool = False) -> Unit:
         """Return the unit of lengths that are no positions."""
-        return LENGTHS.get(self.position, LENGTHS["mm"])
+        return DEGREES if turns else LENGTHS.get(self.position, LENGTHS["mm"])
 
     def as_chosen(self, factor: float, name: str) -> tuple[float, str]:
         """Return the factor from SI and the name of a unit, those of a pressure or a length as chosen.
