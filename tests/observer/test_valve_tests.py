@@ -56,7 +56,8 @@ def panel(monkeypatch: pytest.MonkeyPatch, script: str, consent: float = 0.0) ->
 
 
 def begun(tests: ValveTests, show: Callable[[str], None] = lambda _: None, **other: Any) -> Confirmation:
-    return tests.run(**{"role": Role.ENGINEER, "test": "partial stroke", "kind": "as_left", "show": show} | other)
+    asked: dict[str, Any] = {"role": Role.ENGINEER, "test": "partial stroke", "kind": "as_left", "show": show}
+    return tests.run(**asked | other)
 
 
 @pytest.mark.parametrize(("consent", "written"), [(0.0, [1.0, 0.0]), (1.0, [])])
