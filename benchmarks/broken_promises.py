@@ -16,7 +16,20 @@ from pathlib import Path
 from typing import NamedTuple
 
 ROOT = Path(__file__).parents[1]
-ROOMS = ("config", "fieldbus", "drivers", "positioner", "sim", "workbench", "benchmarks", "docs", "tests")
+ROOMS = (
+    "config",
+    "signals",
+    "webpage",
+    "fieldbus",
+    "drivers",
+    "positioner",
+    "northbound",
+    "sim",
+    "workbench",
+    "benchmarks",
+    "docs",
+    "tests",
+)
 
 
 class Breakage(NamedTuple):

@@ -31,12 +31,12 @@ from typing import Self
 
 from config.codes import EventKind, Fault, Mode
 from config.daemon_file import DaemonFile
+from config.recorder_files import files_of
 from config.recording import Recording
 from config.slave_file import SlaveFile
 from config.valve_file import load_valve, shipped_valve
 from positioner.cli.parts.children import port_in, running
 from positioner.control.requests import Requests
-from positioner.daemon.recorder import files_of
 from positioner.dcs import Dcs, DcsError
 from positioner.history.history_reader import HistoryReader
 from positioner.virtual.virtual_cycle import virtual_cycle

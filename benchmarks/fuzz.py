@@ -25,7 +25,7 @@ if TYPE_CHECKING:
     from tests.fuzz.parser import Parser
 
 INSTRUMENTED = (
-    "config", "fieldbus", "drivers", "positioner.daemon", "positioner.history", "positioner.pages", "sim.slave",
+    "config", "fieldbus", "drivers", "positioner.daemon", "positioner.history", "northbound", "webpage", "sim.slave",
     "canopen", "pymodbus.pdu", "pymodbus.framer", "tomllib", "json", "csv", "configparser", "openpyxl",
 )  # fmt: skip
 """The packages whose branches guide; not the valve's equations, which are compiled."""

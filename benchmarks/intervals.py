@@ -15,8 +15,8 @@ from os import cpu_count
 import numpy as np
 
 from sim.composition import Composition
-from workbench import fit
 from workbench.blind.hiding import hide
+from workbench.fit.fitting import fit
 
 FIRST_SEED = {"clean": 41000, "dirty": 42000}
 CASES = 40

@@ -25,6 +25,7 @@ from config.codes import Fault, Mode
 from config.daemon_file import load_daemon
 from config.errors import InputError
 from config.modbus_map import SIMULATED_MAP
+from config.recorder_files import files_of
 from config.recording import Recording
 from fieldbus.modbus.client import ModbusClient
 from positioner.cli.parts.children import port_in
@@ -32,7 +33,6 @@ from positioner.control.valve_knowledge import ValveKnowledge
 from positioner.daemon.health.health_file import read_record
 from positioner.daemon.memory.conditions import conditions_of
 from positioner.daemon.memory.memory_file import SET_ASIDE, read_memory, write_memory
-from positioner.daemon.recorder import files_of
 from positioner.dcs import Dcs, DcsError
 from positioner.estimation.acceptance import Ratios
 from positioner.history.history_reader import HistoryReader

@@ -14,8 +14,6 @@ import time
 from collections.abc import Iterator
 from pathlib import Path
 
-from config.exports.column_mapping import read_mapping
-from config.historian_export import read_export
 from config.recording import Recording
 from config.valve_file import ValveFile, load_valve, shipped_valve
 from workbench.data.held_out import split
@@ -24,6 +22,8 @@ from workbench.diagnosis.diagnosis import diagnose
 from workbench.diagnosis.positioner_or_packing import positioner_or_packing
 from workbench.fit.fitting import fit
 from workbench.forces.force_diagnosis import ForceDiagnosis, diagnose_forces
+from workbench.imports.column_mapping import read_mapping
+from workbench.imports.historian_export import read_export
 from workbench.select.block_errors import block_errors
 from workbench.select.effect_candidates import EvaluatedModel
 

@@ -22,7 +22,7 @@ from config.valve_file import EffectTable, ValveFile, load_valve, shipped_valve
 from sim.composition import Composition
 from sim.open_loop import respond
 from sim.valve import Valve
-from workbench import diagnose
+from workbench.diagnosis.diagnosis import diagnose
 
 SEED = load_valve(shipped_valve("seed"))
 SPAN_PA = SEED.valve.spring_n_per_m * SEED.valve.stroke_m / SEED.valve.diaphragm_area_m2

@@ -16,10 +16,11 @@ import numpy as np
 from config.valve_file import ValveFile
 from sim.composition import Composition
 from sim.effect import first_effects, shipped_effect
-from workbench import compare, diagnose
 from workbench.blind.hiding import hide
+from workbench.compare.comparison import compare
 from workbench.data.held_out import split
 from workbench.data.record import Record
+from workbench.diagnosis.diagnosis import diagnose
 from workbench.fit.fitting import base_fit
 from workbench.fit.problem import problem
 from workbench.model.free_run import FINE, Accuracy, FreeRun

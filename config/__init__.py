@@ -17,12 +17,13 @@ Its files:
     supervision_table, record_tables              tables [safety] and [supervision]; [recorder] and [history]
     alarm_table, alarm_advice                     table [alarms]; what somebody does about an alarm
     hosts, serial_port, tls_table                 where it is, and how it is secured
-    bus_plugins, law_names, extras                buses of other packages; laws; which package is not installed
+    offered, bus_plugins, law_names               what other packages bring by entry points; buses; laws
+    extras                                        which extra brings what is not installed
     quantities, modbus_map, register_format       what a device measures and obeys; its registers; values in words
     registers, codes, roles                       the supervisory table; every code and its text; who may write
     passwords, role_passwords                     passwords as they are kept; the file with those of the roles
-    recording, historian_export, noise            the recording format; others' exports; the noise of a position
-    exports                                       each step from a file of another program to a recording
+    recording, noise, plausibility                the recording format; a position's noise; what is odd about either
+    recorder_files                                the files of a daemon's recorder, by their names
     results                                       what results have in common in a notebook
     arguments                                     what the library's functions are given: other kinds are refused
     errors                                        InputError (exit status 2), CommandFailed (1): each one line

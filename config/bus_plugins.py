@@ -8,7 +8,7 @@ A package offers a bus by two entry points of the same name:
 They are two, since reading a file needs no driver, and no driver's libraries. `docs/drivers.md` has an example.
 """
 
-from importlib.metadata import EntryPoint, entry_points
+from importlib.metadata import EntryPoint
 from typing import TYPE_CHECKING, Annotated, Any, Union
 
 from pydantic import Tag, model_validator
@@ -16,22 +16,9 @@ from pydantic import Tag, model_validator
 from config.device import Device
 from config.errors import InputError
 from config.loading import chosen_by
+from config.offered import offered, origin
 
 DEVICES, DRIVERS = "positioner.devices", "positioner.drivers"
-
-
-def offered(group: str) -> dict[str, EntryPoint]:
-    """Return what the installed packages offer in a group, by name.
-
-    Raises:
-        InputError: two packages offer the same name.
-    """
-    by_name: dict[str, EntryPoint] = {}
-    for entry in entry_points(group=group):
-        other = by_name.setdefault(entry.name, entry)
-        if other.value != entry.value:
-            raise InputError(_origin(entry), f"bus {entry.name!r} is offered by {_origin(other)} too; remove one")
-    return by_name
 
 
 def loaded(entry: EntryPoint) -> Any:
@@ -45,15 +32,11 @@ def loaded(entry: EntryPoint) -> Any:
     except ModuleNotFoundError as error:
         package = entry.dist.name if entry.dist else "the package"
         raise InputError(
-            _origin(entry),
+            origin(entry),
             f"bus {entry.name!r} needs {error.name}, which is not installed: pip install '{package}[{entry.name}]'",
         ) from None
     except Exception as error:  # somebody else's module: anything may be wrong in it
-        raise InputError(_origin(entry), f"{entry.group}: {entry.value} cannot be loaded: {error}") from None
-
-
-def _origin(entry: EntryPoint) -> str:
-    return f"package {entry.dist.name}" if entry.dist else "a package without a name"
+        raise InputError(origin(entry), f"{entry.group}: {entry.value} cannot be loaded: {error}") from None
 
 
 def _schema(entry: EntryPoint) -> type[Device]:
@@ -65,7 +48,7 @@ def _schema(entry: EntryPoint) -> type[Device]:
     else:
         if isinstance(schema, type) and issubclass(schema, Device):
             return schema
-        reason = f"{_origin(entry)}: {entry.group}: {entry.value} is no config.device.Device"
+        reason = f"{origin(entry)}: {entry.group}: {entry.value} is no config.device.Device"
 
     class Unusable(Device):
         @model_validator(mode="before")
@@ -80,7 +63,7 @@ if TYPE_CHECKING:
     AnyDevice = Device
 else:
     AnyDevice = Annotated[
-        Union[tuple(Annotated[_schema(entry), Tag(name)] for name, entry in offered(DEVICES).items())],  # noqa: UP007
+        Union[tuple(Annotated[_schema(entry), Tag(name)] for name, entry in offered(DEVICES, "bus").items())],  # noqa: UP007
         chosen_by("bus", "modbus"),
     ]
 """A device on any bus; `bus` says which."""

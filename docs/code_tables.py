@@ -7,13 +7,13 @@ from dataclasses import fields
 from pathlib import Path
 
 from config.codes import CAUSES, AlarmState, Code, EventKind, Ne107Cause, Ne107Status, Refusal, ValveTestVerdict
+from northbound.observer.words import CODES
 from positioner.control.laws.slides.states import State
 from positioner.control.laws.slides.transitions import COMMANDING, TABLE
 from positioner.control.permissives import table as permissives
 from positioner.daemon.health.ne107 import CLASS
 from positioner.daemon.service_state import table
 from positioner.history.entries import TABLES, Entry
-from positioner.observer.words import CODES
 
 HERE = Path(__file__).parent
 BEGIN = "<!-- classes: written by `python -m docs.code_tables` -->"

@@ -10,7 +10,7 @@ import sys
 from importlib.util import find_spec
 from pathlib import Path
 
-OWN = ("config", "signals", "fieldbus", "drivers", "sim", "workbench")
+OWN = ("config", "signals", "fieldbus", "drivers", "sim", "workbench", "webpage", "northbound")
 HOME = Path(__file__).resolve().parents[1]
 WHAT_TO_DO = (
     "start from another folder, take its folder off PYTHONPATH, or install positioner in an environment of its own"

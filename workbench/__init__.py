@@ -1,14 +1,8 @@
 """The workbench: hold the model against measurements, see where it fails, fit it, find what it lacks.
 
-    from workbench import Recording, compare, diagnose, fit
+Its functions are names of the library, `import positioner` (docs/library.md). Its rooms, each on those before it:
 
-    recording = Recording.read("rec.csv")
-    print(compare(recording, load_valve("valve.toml")).sentences)
-    better = fit(recording, load_valve("valve.toml")).valve
-    print(diagnose(recording, load_valve("valve.toml")).sentence)
-
-Its rooms, each on those before it:
-
+    imports        files of other programs made recordings
     data           a recording made ready
     model          the model run through it
     compare        where it fails
@@ -22,28 +16,5 @@ Its rooms, each on those before it:
     report         all of it for a browser
     fleet          many valves at once
     loops          control loops without a stem signal
+    page           all of it in a browser, while it is worked
 """
-
-from config.recording import Recording
-from workbench.compare.comparison import Comparison, compare
-from workbench.data.imposed_motion import read_imposed
-from workbench.diagnosis.diagnosis import Diagnosis, diagnose
-from workbench.diagnosis.extension import Extension, extend
-from workbench.fit.fit_result import Fit
-from workbench.fit.fitting import fit
-from workbench.forces.force_diagnosis import ForceDiagnosis, diagnose_forces
-
-__all__ = [
-    "Comparison",
-    "Diagnosis",
-    "Extension",
-    "Fit",
-    "ForceDiagnosis",
-    "Recording",
-    "compare",
-    "diagnose",
-    "diagnose_forces",
-    "extend",
-    "fit",
-    "read_imposed",
-]

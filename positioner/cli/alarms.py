@@ -29,7 +29,7 @@ def run(arguments: argparse.Namespace) -> int:
     """Do what is asked for, then print the alarms; exit status 1 while one is unacknowledged."""
     import json
 
-    from positioner.observer.alarms import BITS, alarms
+    from northbound.observer.alarms import BITS, alarms
 
     wanted = {name: _cause(getattr(arguments, name)) for name in ("shelve", "unshelve") if getattr(arguments, name)}
     if arguments.acknowledge not in (None, "all"):

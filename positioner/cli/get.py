@@ -21,7 +21,7 @@ def run(arguments: argparse.Namespace) -> int:
 
     from config.json_value import json_value
     from config.registers import BY_NAME, register_named
-    from positioner.observer.words import in_words
+    from northbound.observer.words import in_words
 
     names = arguments.names or list(BY_NAME)
     for name in names:

@@ -32,7 +32,7 @@ def run(arguments: argparse.Namespace) -> int:
 
     from config.json_value import json_value
     from config.registers import BY_NAME
-    from positioner.observer.words import in_words
+    from northbound.observer.words import in_words
 
     days = _days(arguments)
     with connected(arguments) as dcs:

@@ -25,11 +25,11 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
 def run(arguments: argparse.Namespace) -> int:
     """Print what the file holds, or what is read of it; 0."""
     from config.errors import InputError
-    from config.exports.own_format import own_recording
-    from config.exports.plausibility import oddities
+    from config.plausibility import oddities
     from positioner.cli.parts.breaking_off import told_when_broken_off
     from positioner.cli.parts.output_files import recording_writable
     from positioner.cli.parts.progress import Progress
+    from workbench.imports.own_format import own_recording
 
     take_mapping(arguments)
     if arguments.inspect:
@@ -60,9 +60,9 @@ def _inspect(arguments: argparse.Namespace) -> int:
     """Show what the file holds, ask what it leaves open, write it down, and say what reads it."""
     import shlex
 
-    from config.exports.export_preview import preview
-    from config.exports.import_questions import answered
-    from config.exports.mapping_file import write_mapping_file
+    from workbench.imports.export_preview import preview
+    from workbench.imports.import_questions import answered
+    from workbench.imports.mapping_file import write_mapping_file
 
     found = preview(arguments.file, arguments.sheet)
     print(f"{arguments.file}: {found.summary()}")
@@ -86,7 +86,7 @@ def _ask(question: str, otherwise: str) -> str:
 
 
 def _list(arguments: argparse.Namespace) -> int:
-    from config.exports.export_preview import preview
+    from workbench.imports.export_preview import preview
 
     export_options(arguments)
     print(f"{arguments.file}: {preview(arguments.file, arguments.sheet).summary()}")

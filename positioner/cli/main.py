@@ -7,7 +7,6 @@ Exit status: 0 done, 1 the thing asked about does not hold, 2 bad input, or an o
 import argparse
 import errno
 import gc
-import importlib
 import io
 import os
 import select
@@ -15,54 +14,7 @@ import sys
 from collections.abc import Sequence
 from typing import NoReturn
 
-COMMANDS = (
-    "demo",
-    "sim",
-    "run",
-    "probe",
-    "doctor",
-    "get",
-    "set",
-    "identify",
-    "commission",
-    "signature",
-    "pst",
-    "cst",
-    "steps",
-    "report",
-    "discriminate",
-    "map",
-    "health",
-    "alarms",
-    "events",
-    "metrics",
-    "opcua",
-    "import",
-    "valve",
-    "simulate",
-    "export",
-    "play",
-    "estimate",
-    "response",
-    "compare",
-    "diagnose",
-    "discover",
-    "extend",
-    "fleet",
-    "loop",
-    "loops",
-    "workbench",
-    "page",
-    "reproduce",
-    "hide",
-    "certificates",
-    "completion",
-)
-
 NO_MORE_FILES = frozenset((errno.EMFILE, errno.ENFILE))
-
-MODULES = {"import": "import_recording", "valve": "valve_from_data_sheet"}
-"""Files of commands whose name is taken: by the language, by another file."""
 
 
 def main(words: Sequence[str] | None = None) -> int:
@@ -92,20 +44,22 @@ def _done(words: Sequence[str] | None) -> int:
     from positioner.cli.parts.output_files import refuse_own_inputs
 
     _escape_what_cannot_be_shown()
-    arguments = _understood(words)
+    who = "positioner"
     try:
+        arguments = _understood(words)
+        who = f"positioner {arguments.command}"
         refuse_own_inputs(arguments)
         status = int(arguments.run(arguments))
         sys.stdout.flush()
         return status
     except InputError as error:
-        print(f"positioner {arguments.command}: {error}", file=sys.stderr)
+        print(f"{who}: {error}", file=sys.stderr)
         return 2
     except CommandFailed as error:
-        print(f"positioner {arguments.command}: {error}", file=sys.stderr)
+        print(f"{who}: {error}", file=sys.stderr)
         return 1
     except ModuleNotFoundError as error:
-        if said := told(f"positioner {arguments.command}:", error):
+        if said := told(f"{who}:", error):
             print(said, file=sys.stderr)
             return 2
         raise
@@ -118,7 +72,7 @@ def _done(words: Sequence[str] | None) -> int:
         if not _unprintable():
             raise
         _drop_output()
-        print(f"positioner {arguments.command}: standard output cannot be written: {error.strerror}", file=sys.stderr)
+        print(f"{who}: standard output cannot be written: {error.strerror}", file=sys.stderr)
         return 2
 
 
@@ -171,15 +125,18 @@ class OneLine(argparse.ArgumentParser):
 
 def _understood(words: Sequence[str] | None) -> argparse.Namespace:
     """Return what the words say; of one too many its command tells, whose help lists what it takes."""
-    arguments, unknown = command_parser().parse_known_args(words)
+    given = list(sys.argv[1:] if words is None else words)
+    arguments, unknown = command_parser(given).parse_known_args(given)
     if unknown:
         OneLine(prog=f"positioner {arguments.command}").error(f"unrecognized arguments: {' '.join(unknown)}")
     return arguments
 
 
-def command_parser() -> argparse.ArgumentParser:
-    """Return the parser of all commands, which are imported for it."""
+def command_parser(words: Sequence[str] = ()) -> argparse.ArgumentParser:
+    """Return the parser of the command that the words begin with, or of all: what is parsed is imported."""
     from importlib.metadata import version
+
+    from positioner.cli.parts.command_finder import commands_for
 
     parser = OneLine(
         prog="positioner",
@@ -188,10 +145,14 @@ def command_parser() -> argparse.ArgumentParser:
     )
     parser.add_argument("--version", action="version", version=f"positioner {version('positioner')}")
     commands = parser.add_subparsers(dest="command", metavar="COMMAND", required=True)
-    for name in COMMANDS:
-        module = importlib.import_module(f"positioner.cli.{MODULES.get(name, name)}")
+    found = commands_for(list(words))
+    for each in found:
+        if len(found) > 1 and each.lacks:
+            commands.add_parser(each.name, help=each.lacks)
+            continue
+        module = each.module
         command = commands.add_parser(
-            name, help=module.HELP, description=module.HELP, epilog=f"example: {module.EXAMPLE}"
+            each.name, help=module.HELP, description=module.HELP, epilog=f"example: {module.EXAMPLE}"
         )
         module.add_arguments(command)
         command.set_defaults(run=module.run)

@@ -58,7 +58,7 @@ def run(arguments: argparse.Namespace) -> int:
 def _configuration(reader: str, config: Path | None) -> None:
     from config.daemon_file import load_valves
     from config.errors import InputError
-    from positioner.cli.parts.register_readers import configuration
+    from northbound.client_configurations.register_readers import configuration
 
     if config is None:
         raise InputError(f"--format {reader}", "needs --config, the daemon's file that says where the registers are")

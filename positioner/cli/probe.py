@@ -59,8 +59,8 @@ def run(arguments: argparse.Namespace) -> int:
 
 def unfit(reading: "Reading") -> str:
     """Return what the device says of itself that is a fault; empty where it is well."""
+    from northbound.observer.words import device_status
     from positioner.control.supervision import UNFIT_STATUS
-    from positioner.observer.words import device_status
 
     if reading.status & UNFIT_STATUS:
         return (

@@ -14,7 +14,6 @@ import errno
 import logging
 import math
 import os
-import re
 import time
 from collections import deque
 from datetime import UTC, datetime
@@ -26,21 +25,12 @@ from config.drive import COLUMNS as OF_KIND
 from config.drive import VALVE, Kind
 from config.errors import InputError
 from config.file_stem import file_stem
+from config.recorder_files import COLUMNS, compressed_already, files_of_stem, number_of
 from positioner.daemon.logs import log_event
 from positioner.daemon.recording_compression import Compression, half_done
 
 log = logging.getLogger(__name__)
 
-COLUMNS = (
-    "time_s",
-    "command_pa",
-    "position_m",
-    "pressure_pa",
-    "reference_m",
-    "state",
-    "lost_samples",
-    "unrecorded",
-)
 Row = tuple[float, float, float, float, float, int, int]
 
 
@@ -193,8 +183,8 @@ class Recorder:
         """Begin a file, and delete the oldest beyond those to keep."""
         now = datetime.now(UTC)
         header = f"# valve: {self._valve}\n# recorded: {now:%Y-%m-%dT%H:%M:%SZ}\n{self._columns}\n".encode()
-        others = _files(self._folder, self._stem)
-        number = _number(others[-1]) + 1 if others else 1
+        others = files_of_stem(self._folder, self._stem)
+        number = number_of(others[-1]) + 1 if others else 1
         path = self._folder / f"{self._stem}-{now:%Y%m%dT%H%M%SZ}-{number:04d}.csv"
         file = os.open(path, os.O_WRONLY | os.O_CREAT | os.O_EXCL | os.O_APPEND, 0o644)
         try:
@@ -214,36 +204,11 @@ class Recorder:
             except OSError as error:
                 log_event(log, logging.WARNING, "old recording stays", file=str(old), reason=error.strerror)
         if self._compression is not None:
-            for path in _compressed_already(self._folder, self._stem):
+            for path in compressed_already(self._folder, self._stem):
                 path.unlink(missing_ok=True)
-            self._compression.begin([each for each in _files(self._folder, self._stem)[:-2] if each.suffix == ".csv"])
-
-
-def files_of(folder: Path, name: str) -> list[Path]:
-    """Return the recordings of a valve in a folder, oldest first."""
-    return _files(folder, file_stem(name))
-
-
-def _files(folder: Path, stem: str) -> list[Path]:
-    found = _all_files(folder, stem) - _compressed_already(folder, stem)
-    return sorted(found, key=lambda each: (_number(each), each))
-
-
-def _all_files(folder: Path, stem: str) -> set[Path]:
-    # By its whole name: a valve FV-1 must not take what belongs to a valve FV-1-A.
-    mine = re.compile(re.escape(stem) + r"-\d{8}T\d{6}Z-\d+\.csv(\.gz)?")
-    return {each for each in folder.iterdir() if mine.fullmatch(each.name)}
-
-
-def _compressed_already(folder: Path, stem: str) -> set[Path]:
-    """Return the plain files whose compressed twin is whole: for a moment, or after a crash, both are there."""
-    found = _all_files(folder, stem)
-    return {each for each in found if each.with_name(f"{each.name}.gz") in found}
-
-
-def _number(file: Path) -> int:
-    """Return the running number of a recording."""
-    return int(file.name.partition(".csv")[0].rpartition("-")[2])
+            self._compression.begin(
+                [each for each in files_of_stem(self._folder, self._stem)[:-2] if each.suffix == ".csv"]
+            )
 
 
 def _line(row: Row, unrecorded: int) -> str:

@@ -11,7 +11,7 @@ import numpy as np
 
 from config.arguments import kinds_held
 from config.errors import InputError
-from config.exports.plausibility import odd_sizes
+from config.plausibility import odd_sizes
 from config.recording import Recording
 from config.results.block import Block, Table
 from config.results.result import Result

@@ -13,8 +13,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from config.arguments import kinds_held
-from config.exports.plausibility import odd_sizes
 from config.noise import quantum_m
+from config.plausibility import odd_sizes
 from config.recording import Column, Recording
 from positioner.response.dead_band import dead_band_and_resolution
 from positioner.response.figure import Figure, undetermined

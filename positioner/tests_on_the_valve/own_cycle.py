@@ -10,9 +10,10 @@ import numpy as np
 
 from config.codes import ExperimentState
 from config.drive import VALVE, Kind
+from config.recorder_files import COLUMNS
 from config.recording import Recording, of_kind
 from positioner.daemon.cycle import Cycle
-from positioner.daemon.recorder import COLUMNS, Row
+from positioner.daemon.recorder import Row
 from positioner.tests_on_the_valve.program import PLAYED, Played, Program
 
 

@@ -21,7 +21,8 @@ import yaml
 import config
 from config.recording import read_recording
 from config.registers import REGISTERS
-from positioner.cli.main import COMMANDS, command_parser, main
+from positioner.cli.main import command_parser, main
+from positioner.cli.parts.command_finder import all_commands
 
 Capture = pytest.CaptureFixture[str]
 DAEMON = "[valve]\nstroke_m = 0.1016\n[device]\nport = {port}\n[supervisory]\nport = 0\n"
@@ -80,10 +81,10 @@ def test_help_names_every_command_and_each_has_an_example() -> None:
     everything = subprocess.run(
         [sys.executable, "-m", "positioner.cli", "--help"], capture_output=True, text=True, check=True
     ).stdout
-    assert all(f"\n  {name}" in everything for name in COMMANDS) or all(name in everything for name in COMMANDS)
+    assert all(re.search(rf"^ +{name}\b", everything, re.MULTILINE) for name in all_commands())
 
 
-@pytest.mark.parametrize("command", COMMANDS)
+@pytest.mark.parametrize("command", all_commands())
 def test_help_of_each_command_ends_with_an_example(command: str, capsys: Capture) -> None:
     with pytest.raises(SystemExit) as caught:
         main([command, "--help"])
@@ -101,13 +102,49 @@ def test_the_version_is_said(capsys: Capture) -> None:
 def test_help_needs_nothing_but_the_standard_library() -> None:
     """Instant help, and a gateway without the model side still has it."""
     parsing = "import sys; from positioner.cli.main import command_parser; command_parser(); print(*sys.modules)"
-    loaded = subprocess.run(
-        [sys.executable, "-c", parsing],
-        capture_output=True,
-        text=True,
-        check=True,
-    ).stdout.split()
-    assert not {"numpy", "numba", "pydantic", "pymodbus", "scipy", "sim", "matplotlib"} & set(loaded)
+    done = subprocess.run([sys.executable, "-c", parsing], capture_output=True, text=True, check=True)
+    assert not {"numpy", "numba", "pydantic", "pymodbus", "scipy", "sim", "matplotlib"} & set(done.stdout.split())
+
+
+GATEWAY = """
+import sys
+import positioner.cli.parts.command_finder as command_finder
+command_finder.find_spec = lambda name: None
+from positioner.cli.main import command_parser
+import positioner.daemon.service
+print(command_parser().format_help(), file=sys.stderr)
+print(*sys.modules)
+"""
+"""No extra is installed."""
+
+
+def test_a_gateway_imports_no_room_beyond_the_daemon_and_is_told_what_an_extra_adds() -> None:
+    done = subprocess.run([sys.executable, "-c", GATEWAY], capture_output=True, text=True, check=True)
+    imported = {name.partition(".")[0] for name in done.stdout.split()}
+    assert not {"northbound", "webpage", "workbench", "sim"} & imported
+    said = " ".join(done.stderr.split())
+    assert "page needs more: pip install 'positioner[web]'" in said
+    assert "diagnose needs more: pip install 'positioner[sim,plot]'" in said
+
+
+def test_a_package_brings_a_command(tmp_path: Path, monkeypatch: pytest.MonkeyPatch, capsys: Capture) -> None:
+    (tmp_path / "acme_command.py").write_text(
+        "HELP = 'say hello'\nEXAMPLE = 'positioner hello'\n"
+        "def add_arguments(parser): pass\ndef run(arguments): print('hello'); return 0\n"
+    )
+    metadata = tmp_path / "acme-1.dist-info"
+    metadata.mkdir()
+    (metadata / "METADATA").write_text("Metadata-Version: 2.1\nName: acme\nVersion: 1\n")
+    (metadata / "entry_points.txt").write_text(
+        "[positioner.commands]\nhello = acme_command\nbroken = acme_nothing\nrun = acme_command\n"
+    )
+    monkeypatch.syspath_prepend(tmp_path)
+    assert main(["hello"]) == 0
+    assert main(["broken"]) == 2
+    out, err = capsys.readouterr()
+    assert out == "hello\n"
+    assert err == "positioner: package acme: command 'broken' cannot be loaded: No module named 'acme_nothing'\n"
+    assert all_commands()["run"].entry is None, "the roof's own are not replaced"
 
 
 @pytest.mark.parametrize("missing", ["numba", "llvmlite"])

@@ -19,7 +19,7 @@ ROOT = Path(__file__).parents[2]
 PROFILES = ROOT / "config" / "profiles"
 JUDGES = ROOT.parent / "shared" / "cases" / "exports" / "26-platform"
 WITHIN_S = 120.0
-ROOMS = ("config", "signals", "sim", "workbench", "fieldbus", "drivers", "positioner")
+ROOMS = ("config", "signals", "webpage", "sim", "workbench", "fieldbus", "drivers", "positioner", "northbound")
 OF_POSIX_ALONE = ("daemon/ending", "daemon/service.py", "positioner/testing/", "parts/pseudo_line", "terminal.py")
 """What a daemon, a serial line and the tests of others need."""
 
@@ -76,11 +76,7 @@ def judged(script: str, name: str, profile: str) -> list[str]:
 
 
 def test_on_windows_everything_else_can_be_loaded() -> None:
-    files = (
-        each
-        for room in ("config", "signals", "sim", "workbench", "fieldbus", "drivers", "positioner")
-        for each in files_of(room)
-    )
+    files = (each for room in ROOMS for each in files_of(room))
     modules = [str(each.with_suffix("")).replace(os.sep, ".").removesuffix(".__init__") for each in files]
     script = (
         "import sys, importlib; from tests.cli.pretended import as_windows; as_windows();"

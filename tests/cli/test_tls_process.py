@@ -17,12 +17,12 @@ from config.errors import CommandFailed
 from config.registers import BY_NAME
 from config.roles import Role
 from config.tls_table import Tls
+from northbound.observer.watched_valves import Place, watching
 from positioner.cli import doctor
 from positioner.cli.main import main
 from positioner.cli.parts.authority import Authority, Owner
 from positioner.cli.parts.children import port_in
 from positioner.dcs import Dcs
-from positioner.observer.watched_valves import Place, watching
 from tests.children import ended, running
 from tests.cli.test_daemon_process import LAW, until
 

@@ -10,14 +10,14 @@ import pytest
 from config import plain_file
 from config.daemon_file import load_valves
 from config.errors import LONGEST, InputError
-from config.exports.file_kind import raw_tables
-from config.exports.text_table import text_tables
 from config.plain_file import MOST_BYTES, MOST_COLUMNS, MOST_VALUES
 from config.recording import Recording
 from config.role_passwords import read_passwords
 from fieldbus.canopen.eds import read_eds
 from positioner.cli.main import main
 from positioner.daemon.health.health_file import HealthRecord, read_record
+from workbench.imports.file_kind import raw_tables
+from workbench.imports.text_table import text_tables
 
 DIGITS = "9" * 5000
 VALVE = "[valve]\nstroke_m = 0.1\n"

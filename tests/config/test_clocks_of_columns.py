@@ -8,9 +8,9 @@ import numpy as np
 import pytest
 
 from config.errors import InputError
-from config.exports.column_mapping import ExportOptions, read_mapping
-from config.exports.export_preview import preview
-from config.historian_export import read_export
+from workbench.imports.column_mapping import ExportOptions, read_mapping
+from workbench.imports.export_preview import preview
+from workbench.imports.historian_export import read_export
 
 BEGIN = datetime.datetime(2026, 3, 5, 8, 15)
 STEM_S = np.arange(0.0, 30.0, 0.5)

@@ -5,8 +5,8 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from config.exports.control_loop import LoopColumn, loops_of
-from config.exports.export_preview import preview
+from workbench.imports.control_loop import LoopColumn, loops_of
+from workbench.imports.export_preview import preview
 
 RNG = np.random.default_rng(5)
 HELD = np.repeat([40.0, 60.0, 45.0, 55.0], 50)

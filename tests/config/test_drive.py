@@ -7,15 +7,15 @@ import pytest
 
 from config.drive import KINDS, VALVE
 from config.errors import InputError
-from config.exports.column_mapping import read_mapping
-from config.exports.export_preview import preview
-from config.historian_export import read_export
 from config.recording import Recording
 from config.valve_file import EffectTable, ValveFile, ValveParameters, load_valve, shipped_valve
 from config.writing import write_valve
 from positioner.cli.main import main
 from sim.composition import Composition
 from sim.effect import shipped_effect, shipped_effects
+from workbench.imports.column_mapping import read_mapping
+from workbench.imports.export_preview import preview
+from workbench.imports.historian_export import read_export
 
 MOTOR = """[drive]
 kind = "rotary motor"

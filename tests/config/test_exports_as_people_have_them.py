@@ -16,11 +16,11 @@ import numpy as np
 import pytest
 
 from config.errors import InputError
-from config.exports.column_mapping import ExportOptions, Status, read_mapping
-from config.exports.export_preview import preview
-from config.exports.plausibility import oddities
-from config.historian_export import PLAIN, read_export
+from config.plausibility import oddities
 from config.recording import Recording
+from workbench.imports.column_mapping import ExportOptions, Status, read_mapping
+from workbench.imports.export_preview import preview
+from workbench.imports.historian_export import PLAIN, read_export
 
 N = 60
 T = 0.5 * np.arange(N)

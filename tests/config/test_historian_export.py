@@ -6,10 +6,10 @@ import numpy as np
 import pytest
 
 from config.errors import InputError
-from config.exports import sample_rows
-from config.exports.column_mapping import read_mapping
-from config.historian_export import read_export
 from config.recording import Recording
+from workbench.imports import sample_rows
+from workbench.imports.column_mapping import read_mapping
+from workbench.imports.historian_export import read_export
 
 MAPPING = ("time_s=Zeit", "position_m=PV:%", "command_pa=OUT:bar")
 

@@ -8,7 +8,7 @@ import pytest
 from config.daemon_file import load_daemon
 from config.errors import InputError
 from config.valve_file import load_valve, shipped_valve
-from positioner.cli.parts.served_valves import places_in
+from northbound.served_valves import places_in
 
 SEED = """[valve]
 name = "v"

@@ -10,11 +10,11 @@ import numpy as np
 import pytest
 
 from config.errors import InputError
-from config.exports import reader_process
-from config.exports.column_mapping import ExportOptions, read_mapping
-from config.exports.export_preview import preview
-from config.historian_export import read_export
 from tests.cases import few_always
+from workbench.imports import reader_process
+from workbench.imports.column_mapping import ExportOptions, read_mapping
+from workbench.imports.export_preview import preview
+from workbench.imports.historian_export import read_export
 
 TIME_S = np.arange(0.0, 2.0, 0.01)
 POSITION_MM = 20.0 + 10.0 * np.sin(TIME_S)

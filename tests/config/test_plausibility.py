@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 
 from config.drive import KINDS
-from config.exports.plausibility import oddities
+from config.plausibility import oddities
 from config.recording import KIND, Column, Recording
 
 T = np.arange(0.0, 60.0, 0.05)

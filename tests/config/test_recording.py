@@ -7,8 +7,8 @@ import numpy as np
 import pytest
 
 from config.errors import InputError
-from config.exports.file_kind import raw_tables
 from config.recording import LONGEST_LINE, Recording, read_recording, write_recording
+from workbench.imports.file_kind import raw_tables
 
 HEADER = "time_s,command_pa,position_m\n"
 

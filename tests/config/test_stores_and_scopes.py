@@ -7,9 +7,9 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from config.exports.column_mapping import read_mapping
-from config.exports.export_preview import preview
-from config.historian_export import read_export
+from workbench.imports.column_mapping import read_mapping
+from workbench.imports.export_preview import preview
+from workbench.imports.historian_export import read_export
 
 TIME_S = np.arange(0.0, 20.0, 0.1)
 STEM_MM = np.round(20.0 + 10.0 * np.sin(TIME_S), 4)

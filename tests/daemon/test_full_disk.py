@@ -12,9 +12,9 @@ import numpy as np
 import pytest
 
 from config.codes import EventKind, Fault, Mode
+from config.recorder_files import files_of
 from config.recording import read_recording
 from positioner.cli.parts.children import port_in
-from positioner.daemon.recorder import files_of
 from positioner.dcs import Dcs
 from positioner.history.history_reader import HistoryReader
 from tests.children import child, running

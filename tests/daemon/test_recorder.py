@@ -18,6 +18,7 @@ import pytest
 
 from config import recording
 from config.errors import InputError
+from config.recorder_files import files_of
 from config.recording import read_recording
 from config.valve_file import load_valve, shipped_valve
 from positioner.daemon import recorder as room
@@ -98,7 +99,7 @@ def test_older_files_with_a_later_stamp_do_not_cost_the_file_that_is_written(
     kept = names(tmp_path)
     assert [name.rpartition("-")[2] for name in kept] == ["0004.csv", "0003.csv"]
     assert len(read_recording(tmp_path / kept[0])) == 10
-    assert [path.name for path in room.files_of(tmp_path, "v")] == kept[::-1], "oldest first, by their numbers"
+    assert [path.name for path in files_of(tmp_path, "v")] == kept[::-1], "oldest first, by their numbers"
 
 
 @pytest.mark.parametrize("failing", ["open", "write"])
@@ -121,7 +122,7 @@ def test_a_rotation_that_fails_goes_on_in_the_old_file_and_is_tried_again(
     assert len(names(tmp_path)) == 1
     fill(recorder, 100, 100)
     recorder.stop()
-    files = room.files_of(tmp_path, "v")
+    files = files_of(tmp_path, "v")
     assert len(files) > 1
     times_s = [time_s for path in files for time_s in read_recording(path).time_s]
     assert times_s == pytest.approx([index * 1e-3 for index in range(200)]), "no row is lost"
@@ -152,8 +153,8 @@ def test_valves_of_like_names_and_starts_within_a_second_do_not_meet(
         fill(recorder, 0, 1)
         recorder.stop()
     assert len(names(tmp_path)) == 10
-    assert [len(room.files_of(tmp_path, valve)) for valve in valves] == [2] * 5
-    assert read_recording(room.files_of(tmp_path, "阀门一")[0]).metadata["valve"] == "阀门一"
+    assert [len(files_of(tmp_path, valve)) for valve in valves] == [2] * 5
+    assert read_recording(files_of(tmp_path, "阀门一")[0]).metadata["valve"] == "阀门一"
 
 
 def test_a_row_without_room_is_counted_and_the_next_one_says_so(
@@ -204,7 +205,7 @@ def test_an_old_file_is_followed_by_a_new_one_and_no_row_is_lost(
         hours.now_s = hour * 3601.0
         fill(recorder, hour * 50, 50)
     recorder.stop()
-    files = room.files_of(tmp_path, "v")
+    files = files_of(tmp_path, "v")
     assert [len(read_recording(path)) for path in files] == [50] * 4
     times_s = [time_s for path in files for time_s in read_recording(path).time_s]
     assert times_s == [index * 1e-3 for index in range(200)]
@@ -216,7 +217,7 @@ def compressing(folder: Path, rows: int, keep_files: int = 10) -> None:
     fill(recorder, 0, rows)
     compression = recorder._compression
     assert compression is not None
-    while plain := [path for path in room.files_of(folder, "v")[:-2] if path.suffix == ".csv"]:
+    while plain := [path for path in files_of(folder, "v")[:-2] if path.suffix == ".csv"]:
         compression.begin(plain)  # as the next rotation does
         assert compression._process is not None
         compression._process.wait(60)
@@ -229,7 +230,7 @@ def compressing(folder: Path, rows: int, keep_files: int = 10) -> None:
 def test_closed_files_are_compressed_and_open_as_they_were(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setattr(room, "WRITE_EVERY_S", 0.0)
     compressing(tmp_path, 400)
-    files = room.files_of(tmp_path, "v")
+    files = files_of(tmp_path, "v")
     assert [path.suffix for path in files[-3:]] == [".gz", ".csv", ".csv"]
     assert len(files) == len(names(tmp_path)) > 4, "nothing is there twice, and nothing half done"
     recordings = [read_recording(path) for path in files]
@@ -242,12 +243,12 @@ def test_closed_files_are_compressed_and_open_as_they_were(tmp_path: Path, monke
 def test_compressed_files_count_among_those_that_are_kept(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setattr(room, "WRITE_EVERY_S", 0.0)
     compressing(tmp_path, 400)
-    before = len(room.files_of(tmp_path, "v"))
+    before = len(files_of(tmp_path, "v"))
     compressing(tmp_path, 400, keep_files=3)
     assert before > 3
-    assert len(room.files_of(tmp_path, "v")) <= 4, "one may have been compressed while it was to be deleted"
+    assert len(files_of(tmp_path, "v")) <= 4, "one may have been compressed while it was to be deleted"
     compressing(tmp_path, 1, keep_files=3)
-    assert len(room.files_of(tmp_path, "v")) == len(names(tmp_path)) == 3
+    assert len(files_of(tmp_path, "v")) == len(names(tmp_path)) == 3
 
 
 def closed(folder: Path) -> Path:
@@ -298,7 +299,7 @@ def test_a_compression_killed_at_any_moment_leaves_the_one_or_the_other_whole(tm
             with suppress(subprocess.TimeoutExpired):
                 child.wait(dice.uniform(0.02, 0.35))
             child.kill()
-        found = room.files_of(tmp_path, "FV 101/a")
+        found = files_of(tmp_path, "FV 101/a")
         assert [len(read_recording(each)) for each in found] == [rows]
         for each in tmp_path.glob("*.gz"):
             each.unlink()
@@ -310,7 +311,7 @@ def test_a_plain_file_beside_its_whole_twin_is_deleted_at_the_next_start(tmp_pat
     content = path.read_bytes()
     compress(path)
     path.write_bytes(content)
-    assert [each.suffix for each in room.files_of(tmp_path, "FV 101/a")] == [".gz"]
+    assert [each.suffix for each in files_of(tmp_path, "FV 101/a")] == [".gz"]
     recorder = Recorder(tmp_path, "FV 101/a", 10_000_000, 5, compress=True)
     recorder.start()
     recorder.stop()

@@ -7,7 +7,7 @@ from pathlib import Path
 import pytest
 
 ROOT = Path(__file__).parents[2]
-ROOMS = ("config", "signals", "fieldbus", "drivers", "positioner", "sim", "workbench")
+ROOMS = ("config", "signals", "webpage", "fieldbus", "drivers", "positioner", "northbound", "sim", "workbench")
 WITH_EXAMPLES = sorted(
     ".".join(path.relative_to(ROOT).with_suffix("").parts).removesuffix(".__init__")
     for room in ROOMS

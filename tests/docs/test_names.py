@@ -14,7 +14,8 @@ import pytest
 
 from config.daemon_file import DaemonFile
 from config.slave_file import SlaveFile
-from positioner.cli.main import COMMANDS, command_parser
+from positioner.cli.main import command_parser
+from positioner.cli.parts.command_finder import all_commands
 
 ROOT = Path(__file__).parents[2]
 DOCUMENTS = [ROOT / "README.md", *sorted((ROOT / "docs").rglob("*.md"))]
@@ -22,6 +23,8 @@ ROOMS = (
     "benchmarks",
     "config",
     "signals",
+    "northbound",
+    "webpage",
     "deploy",
     "docs",
     "drivers",
@@ -133,7 +136,7 @@ def wrong_command(line: str) -> str | None:
     command, *words = line.split()
     if command.startswith("-") or command == "COMMAND":
         return None
-    if command not in COMMANDS:
+    if command not in all_commands():
         return "no such command"
     used = {word.partition("=")[0] for word in words if word.startswith("-") and not word.lstrip("-")[:1].isdigit()}
     return f"no option {min(used - options(command))}" if used - options(command) else None

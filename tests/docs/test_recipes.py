@@ -12,7 +12,19 @@ from pathlib import Path
 import pytest
 
 ROOT = Path(__file__).parents[2]
-ROOMS = ("config", "docs", "drivers", "fieldbus", "positioner", "signals", "sim", "tests", "workbench")
+ROOMS = (
+    "config",
+    "docs",
+    "drivers",
+    "fieldbus",
+    "northbound",
+    "positioner",
+    "signals",
+    "sim",
+    "tests",
+    "webpage",
+    "workbench",
+)
 GUIDE = (ROOT / "docs" / "architecture.md").read_text(encoding="utf-8").partition("\n## How to add\n")[2]
 RECIPES = dict(re.findall(r"^### (.+)\n((?:(?!^##).*\n)+)", GUIDE, re.MULTILINE))
 BEING_WRITTEN = "*.pyc.*"

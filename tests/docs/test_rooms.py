@@ -7,7 +7,7 @@ from pathlib import Path
 import pytest
 
 ROOT = Path(__file__).parents[2]
-FLOORS = ("config", "signals", "fieldbus", "drivers", "sim", "workbench", "positioner")
+FLOORS = ("config", "signals", "webpage", "fieldbus", "drivers", "sim", "workbench", "positioner", "northbound")
 LISTED_ELSEWHERE = {
     "sim/effects": "docs/effects.md, from their own declarations",
     "positioner": "the library's facade: docs/architecture.md",

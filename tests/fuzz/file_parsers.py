@@ -24,11 +24,6 @@ from cryptography.hazmat.primitives.serialization import Encoding
 from config.canopen_device import SHIPPED_EDS
 from config.daemon_file import load_valves
 from config.errors import InputError
-from config.exports.column_mapping import read_mapping
-from config.exports.export_preview import preview
-from config.exports.mapping_file import read_mapping_file
-from config.exports.own_format import own_recording
-from config.historian_export import read_export
 from config.loading import SHIPPED
 from config.recording import Recording, read_recording
 from config.role_passwords import read_passwords
@@ -46,6 +41,11 @@ from tests.certificates import folder as certificates
 from tests.certificates import revoke, tls
 from tests.daemon.memory.test_memory_file import KNOWLEDGE, NOW
 from tests.fuzz.parser import Later, Parser, refused_in_one_line, require_line
+from workbench.imports.column_mapping import read_mapping
+from workbench.imports.export_preview import preview
+from workbench.imports.historian_export import read_export
+from workbench.imports.mapping_file import read_mapping_file
+from workbench.imports.own_format import own_recording
 
 NODE = 5
 

@@ -67,7 +67,8 @@ def test_the_command_does_not_see_it() -> None:
     assert "9 samples" in estimated.stdout
     Path("daemon.toml").write_text("[valve]\nstroke_m = 0.1\n[device]\nport = 1\n")
     examined = run("positioner", "doctor", "daemon.toml").stdout
-    assert "packages     ok    config, signals, fieldbus, drivers, sim, workbench are positioner's own" in examined
+    assert "packages     ok    config, signals, " in examined
+    assert "positioner's own" in examined
 
 
 def test_started_as_a_module_the_command_says_what_is_in_the_way(foreign: Path) -> None:

@@ -17,13 +17,13 @@ from config.registers import JITTER_BOUNDS_S
 from config.travel import Travel
 from fieldbus.modbus.request_counts import RequestCounts
 from fieldbus.modbus.server import RegisterServer
+from northbound.metrics.exporter import serve_metrics
+from northbound.metrics.scraped_valve import ScrapedValve
+from northbound.metrics.valve_metrics import friction_interval_pa
 from positioner.cli.main import main
 from positioner.cli.parts.children import port_in
 from positioner.daemon.cycle_statistics import CycleStatistics
 from positioner.daemon.supervisory_registers import SupervisoryRegisters
-from positioner.metrics.exporter import serve_metrics
-from positioner.metrics.scraped_valve import ScrapedValve
-from positioner.metrics.valve_metrics import friction_interval_pa
 from tests.children import child, running
 from tests.cli.test_daemon_process import PATIENT, daemon_file, slave_file
 from tests.daemon.test_supervisory_registers import Panel

@@ -4,7 +4,7 @@ import math
 
 import pytest
 
-from positioner.observer.freshness import FreshnessMemory, after_failure, after_reading, freshness
+from northbound.observer.freshness import FreshnessMemory, after_failure, after_reading, freshness
 
 SOON_S = 2.0
 POLL_S = 0.05

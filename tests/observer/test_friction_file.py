@@ -6,8 +6,8 @@ from pathlib import Path
 import pytest
 
 from config.errors import InputError
-from positioner.observer.friction_file import FrictionFile
-from positioner.observer.valve_view import ValveView
+from northbound.observer.friction_file import FrictionFile
+from northbound.observer.valve_view import ValveView
 
 
 def readings(friction_pa: float) -> dict[str, float]:

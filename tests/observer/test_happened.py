@@ -3,10 +3,10 @@
 from pathlib import Path
 
 from config.codes import EventKind, Fault, Mode, Ne107Status
+from northbound.observer.happened import AS_SERVED, FROM_HISTORY, SeenEvent, _said, served_event, what_happened
+from northbound.observer.valve_view import ValveView
 from positioner.history import HistoryFile
 from positioner.history.entries import Event
-from positioner.observer.happened import AS_SERVED, FROM_HISTORY, SeenEvent, _said, served_event, what_happened
-from positioner.observer.valve_view import ValveView
 
 FAULT = Event("FV-101", 1, 1e9, EventKind.FAULT, "FAULT", Ne107Status.FAILURE, Fault.NO_REPLY, "no reply")
 MODE = Event("FV-101", 2, 1e9 + 60, EventKind.MODE, "MODE", Ne107Status.GOOD, Mode.AUTOMATIC, "automatic")

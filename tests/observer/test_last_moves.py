@@ -6,9 +6,10 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from positioner.daemon.recorder import COLUMNS, Recorder
-from positioner.observer.last_moves import last_moves, recorded_tail
-from positioner.observer.valve_view import ValveView
+from config.recorder_files import COLUMNS
+from northbound.observer.last_moves import last_moves, recorded_tail
+from northbound.observer.valve_view import ValveView
+from positioner.daemon.recorder import Recorder
 
 RATE_HZ = 200
 

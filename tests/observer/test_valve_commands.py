@@ -10,10 +10,10 @@ import pytest
 
 from config.codes import Fault, Mode
 from config.roles import Role
+from northbound.observer.freshness import Freshness
+from northbound.observer.valve_commands import BrokenOff, Confirmation, ValveCommands
+from northbound.observer.valve_view import ValvePicture
 from positioner.dcs import Dcs, DcsError
-from positioner.observer.freshness import Freshness
-from positioner.observer.valve_commands import BrokenOff, Confirmation, ValveCommands
-from positioner.observer.valve_view import ValvePicture
 from tests.observer.test_words import READY
 
 

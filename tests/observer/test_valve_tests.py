@@ -11,10 +11,10 @@ import pytest
 
 from config.daemon_file import DaemonFile
 from config.roles import Role
-from positioner.observer import valve_tests
-from positioner.observer.valve_commands import Confirmation
-from positioner.observer.valve_tests import ValveTests
-from positioner.observer.watched_valves import Place
+from northbound.observer import valve_tests
+from northbound.observer.valve_commands import Confirmation
+from northbound.observer.valve_tests import ValveTests
+from northbound.observer.watched_valves import Place
 
 SITE = DaemonFile.model_validate({"valve": {"name": "FV-1", "stroke_m": 0.04}, "recorder": {"folder": "recordings"}})
 PASSES = "print('1 of 1: partial stroke, 3 s'); print('partial stroke test of FV-1: passed'); print('kept')"

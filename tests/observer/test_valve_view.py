@@ -7,9 +7,9 @@ import pytest
 
 from config.codes import Fault, Mode, State
 from config.registers import BY_NAME, WRITER_AT
-from positioner.observer.poller import COUNTS, EACH_TIME, REST, names_of
-from positioner.observer.trends import Trend, bands
-from positioner.observer.valve_view import TREND_S, ValveView
+from northbound.observer.poller import COUNTS, EACH_TIME, REST, names_of
+from northbound.observer.trends import Trend, bands
+from northbound.observer.valve_view import TREND_S, ValveView
 
 STROKE_M = 0.1
 POLL_S = 0.05

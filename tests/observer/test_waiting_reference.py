@@ -6,9 +6,9 @@ from pathlib import Path
 import pytest
 
 from config.codes import Mode
+from northbound.observer.waiting_reference import Writer, reference_writer, waiting_reference
 from positioner.history import HistoryFile
 from positioner.history.entries import Write
-from positioner.observer.waiting_reference import Writer, reference_writer, waiting_reference
 
 HELD = {"mode": float(Mode.HOLD), "reference": 0.7, "reference_opening": 0.7, "reference_in_force": 0.2}
 

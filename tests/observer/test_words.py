@@ -6,8 +6,8 @@ import pytest
 
 from config.codes import Code, ExperimentState, Fault, Mode, State, listed
 from config.registers import BY_NAME, REGISTERS
-from positioner.observer.permissives import IDENTIFY_READS, identify_permissives
-from positioner.observer.words import CODES, IDENTIFIED, code_text, estimates_in_words, ne107_causes
+from northbound.observer.permissives import IDENTIFY_READS, identify_permissives
+from northbound.observer.words import CODES, IDENTIFIED, code_text, estimates_in_words, ne107_causes
 
 READY = {
     "mode": Mode.AUTOMATIC,

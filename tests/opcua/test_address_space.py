@@ -8,9 +8,9 @@ from xml.etree import ElementTree
 import pytest
 from asyncua import Node, Server, ua
 
-from positioner.observer.watched_valves import Place
-from positioner.opcua.address_space import NODESETS, OURS, ValveSpace, add_valve, load_types
-from positioner.opcua.valve_nodes import HEALTH, SETPOINT, SIGNAL
+from northbound.observer.watched_valves import Place
+from northbound.opcua.address_space import NODESETS, OURS, ValveSpace, add_valve, load_types
+from northbound.opcua.valve_nodes import HEALTH, SETPOINT, SIGNAL
 
 pytestmark = pytest.mark.patient
 
@@ -31,7 +31,7 @@ def rules() -> tuple[Rules, dict[str, str]]:
     children: Rules = {}
     above: dict[str, str] = {}
     for name in NODESETS:
-        text = files("positioner.opcua").joinpath("nodesets", f"Opc.Ua.{name}.NodeSet2.xml").read_text("utf-8")
+        text = files("northbound.opcua").joinpath("nodesets", f"Opc.Ua.{name}.NodeSet2.xml").read_text("utf-8")
         root = ElementTree.fromstring(text)
         uris = ["http://opcfoundation.org/UA/", *(each.text or "" for each in root.iter(f"{UA}Uri"))]
         for node in root:

@@ -12,7 +12,7 @@ from cryptography.hazmat.primitives.serialization import Encoding, NoEncryption,
 from cryptography.x509.oid import NameOID
 
 from config.errors import InputError
-from positioner.opcua.application_keys import MOST_REJECTED, ApplicationKeys
+from northbound.opcua.application_keys import MOST_REJECTED, ApplicationKeys
 
 NOW = datetime.now(UTC)
 

@@ -6,13 +6,13 @@ from xml.etree import ElementTree
 import pytest
 
 from config.codes import Ne107Status
-from positioner.opcua.device_health import DeviceHealth, device_health
+from northbound.opcua.device_health import DeviceHealth, device_health
 
 UA = "{http://opcfoundation.org/UA/2011/03/UANodeSet.xsd}"
 
 
 def test_the_numbers_are_those_of_the_nodeset() -> None:
-    text = files("positioner.opcua").joinpath("nodesets", "Opc.Ua.Di.NodeSet2.xml").read_text("utf-8")
+    text = files("northbound.opcua").joinpath("nodesets", "Opc.Ua.Di.NodeSet2.xml").read_text("utf-8")
     (health,) = (
         each
         for each in ElementTree.fromstring(text).iter(f"{UA}UADataType")

@@ -20,11 +20,11 @@ from cryptography.x509.oid import ExtendedKeyUsageOID
 
 from config.codes import Mode
 from config.role_passwords import set_password
+from northbound.opcua.address_space import OURS
+from northbound.opcua.valve_nodes import SETPOINT, SIGNAL
 from positioner.cli.main import main
 from positioner.cli.parts.children import port_in
 from positioner.dcs import Dcs
-from positioner.opcua.address_space import OURS
-from positioner.opcua.valve_nodes import SETPOINT, SIGNAL
 from tests.children import child, running
 from tests.cli.test_daemon_process import PATIENT, daemon_file, slave_file
 

@@ -11,8 +11,8 @@ from asyncua import ua
 from asyncua.common.utils import ServiceError
 
 from config.codes import Ne107Status
-from positioner.opcua import recorded_history
-from positioner.opcua.recorded_history import BEGINNING, Recorded, RecordedHistory
+from northbound.opcua import recorded_history
+from northbound.opcua.recorded_history import BEGINNING, Recorded, RecordedHistory
 from tests.history.test_history_file import HOUR, event, opened
 
 HEALTH, FRICTION, VALVE, OTHER = (ua.NodeId(name, 2) for name in ("health", "friction", "valve", "other"))

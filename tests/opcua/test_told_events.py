@@ -4,8 +4,8 @@ from pathlib import Path
 
 import pytest
 
+from northbound.opcua.told_events import ToldEvents
 from positioner.history.entries import Event
-from positioner.opcua.told_events import ToldEvents
 
 
 def event(number: int) -> Event:

@@ -6,9 +6,9 @@ import pytest
 
 from config.codes import Ne107Status, Refusal
 from config.registers import BY_NAME, REGISTERS
-from positioner.observer import ValvePicture
-from positioner.observer.freshness import Freshness
-from positioner.opcua.valve_nodes import (
+from northbound.observer import ValvePicture
+from northbound.observer.freshness import Freshness
+from northbound.opcua.valve_nodes import (
     ESTIMATES,
     HEALTH,
     NUMBERS,

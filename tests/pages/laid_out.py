@@ -3,8 +3,8 @@
 from functools import cache
 from threading import Event
 
-from positioner.pages.workbench_page.background import Progressed, Tell
 from workbench.blind.hiding import Hidden, hide
+from workbench.page.background import Progressed, Tell
 
 
 @cache

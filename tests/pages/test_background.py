@@ -4,8 +4,8 @@ from threading import Event
 import pytest
 
 from config.errors import InputError
-from positioner.pages.workbench_page.background import Failed, News, Progressed, Tell, Work
 from tests.cli.test_daemon_process import until
+from workbench.page.background import Failed, News, Progressed, Tell, Work
 
 pytestmark = pytest.mark.patient
 

@@ -12,21 +12,21 @@ import numpy as np
 import pytest
 
 from config.errors import CommandFailed, InputError
-from config.exports.export_preview import preview
 from config.recording import Recording
 from config.valve_file import shipped_valve
 from positioner.cli.parts.export_arguments import add_export_arguments, read_mapped
-from positioner.pages.workbench_page import desk as desk_module
-from positioner.pages.workbench_page.background import Limits, News, Raced, Work, diagnosed
-from positioner.pages.workbench_page.command_lines import command_lines
-from positioner.pages.workbench_page.desk import SAVED, Desk, named_valve
-from positioner.pages.workbench_page.notebook import notebook
-from positioner.pages.workbench_page.opening import ColumnChoice, Export, Opened, mapped, opened_like, wrong_with
-from positioner.pages.workbench_page.provenance import NamedValve
-from positioner.pages.workbench_page.search import Search
-from positioner.pages.workbench_page.search_panel import SearchPanel
 from tests.pages.laid_out import hidden
 from workbench.diagnosis.extension import extend
+from workbench.imports.export_preview import preview
+from workbench.page import desk as desk_module
+from workbench.page.background import Limits, News, Raced, Work, diagnosed
+from workbench.page.command_lines import command_lines
+from workbench.page.desk import SAVED, Desk, named_valve
+from workbench.page.notebook import notebook
+from workbench.page.opening import ColumnChoice, Export, Opened, mapped, opened_like, wrong_with
+from workbench.page.provenance import NamedValve
+from workbench.page.search import Search
+from workbench.page.search_panel import SearchPanel
 
 
 @cache
@@ -152,7 +152,7 @@ def test_the_notebook_reads_an_export_as_it_was_read(desk: Desk) -> None:
     assert desk.opened is not None
     desk.opened = replace(first(), choice=choice)
     text = notebook(desk)
-    assert "from config.historian_export import read_export" in text
+    assert "from workbench.imports.historian_export import read_export" in text
     assert "'position_m=PV:%', 'command_pa=OUT:%']), 0.04, (10000.0, 90000.0), Exp" in text
     assert "ExportOptions(',', None)" in text
 

@@ -5,7 +5,7 @@ from typing import Any
 import pytest
 
 from config.passwords import MOST_WRONG, PAUSE_S, Password, SignIn
-from positioner.pages.parts.gate import Gate, Message, Receive, Send, TooMuch
+from webpage.gate import Gate, Message, Receive, Send, TooMuch
 
 KEY, COOKIE, MOST = "the-key", "positioner_1", 1000
 

@@ -11,22 +11,22 @@ from typing import TYPE_CHECKING, cast
 
 import pytest
 
-from positioner.pages.workbench_page.background import Work
-from positioner.pages.workbench_page.desk import Desk
-from positioner.pages.workbench_page.opening import Opened
-from positioner.pages.workbench_page.provenance import NamedValve
 from tests.cli.test_daemon_process import until
 from tests.pages.laid_out import ends, hidden, never_ends
+from workbench.page.background import Work
+from workbench.page.desk import Desk
+from workbench.page.opening import Opened
+from workbench.page.provenance import NamedValve
 
 if TYPE_CHECKING:
-    from positioner.pages.workbench_page.page import Workbench
+    from workbench.page.page import Workbench
 
 pytestmark = pytest.mark.patient
 
 
 @pytest.fixture
 def workbench() -> "Iterator[Workbench]":
-    from positioner.pages.workbench_page.page import Workbench
+    from workbench.page.page import Workbench
 
     workbench = Workbench((), None, only_here=True)
     yield workbench
@@ -67,7 +67,7 @@ def test_a_diagnosis_goes_on_while_its_page_is_loaded_again_and_stops_when_it_is
 def test_what_a_search_comes_to_is_not_for_the_page_that_was_loaded_again(workbench: "Workbench") -> None:
     from nicegui import Client, ui
 
-    from positioner.pages.workbench_page.search_panel import SearchPanel
+    from workbench.page.search_panel import SearchPanel
 
     desk = laid(workbench.desk("a"))
     search = desk.begin("diagnose", ends)
@@ -83,7 +83,7 @@ def test_what_a_search_comes_to_is_not_for_the_page_that_was_loaded_again(workbe
 
 
 def test_of_many_closed_tabs_the_oldest_leave_nothing(workbench: "Workbench") -> None:
-    from positioner.pages.workbench_page.page import MOST_LEFT
+    from workbench.page.page import MOST_LEFT
 
     desks = [workbench.desk(f"tab {i}") for i in range(MOST_LEFT + 3)]
     for desk in desks:

@@ -7,14 +7,14 @@ import pytest
 from config.errors import InputError
 from config.recording import Column, Recording
 from config.valve_file import EffectTable, ValveFile
-from positioner.pages.parts.ink import LIGHT
-from positioner.pages.parts.units import Units
-from positioner.pages.workbench_page.live_model import LiveModel
-from positioner.pages.workbench_page.opening import Opened
-from positioner.pages.workbench_page.time_figure import LINES, TimeFigure, Window, window_of
 from tests.pages.laid_out import hidden
+from webpage.ink import LIGHT
+from webpage.units import Units
 from workbench.compare.comparison import compare
 from workbench.data.record import Record, ready
+from workbench.page.live_model import LiveModel
+from workbench.page.opening import Opened
+from workbench.page.time_figure import LINES, TimeFigure, Window, window_of
 
 
 @cache

@@ -3,7 +3,7 @@
 import pytest
 
 from config.errors import InputError
-from positioner.pages.parts.number_field import read_number
+from webpage.number_field import read_number
 
 
 @pytest.mark.parametrize(

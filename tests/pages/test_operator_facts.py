@@ -17,14 +17,14 @@ from config.passwords import MOST_WRONG, SignIn
 from config.registers import BY_NAME
 from config.role_passwords import read_passwords, set_password
 from config.roles import Role
-from positioner.observer.freshness import Freshness
-from positioner.observer.happened import Happened
-from positioner.observer.trends import thinned
-from positioner.observer.valve_view import ValvePicture
-from positioner.observer.waiting_reference import Writer
-from positioner.pages.operator_page import facts
-from positioner.pages.operator_page.moves_ahead import BY_LAW, Ahead
-from positioner.pages.parts.units import LENGTHS, Units
+from northbound.observer.freshness import Freshness
+from northbound.observer.happened import Happened
+from northbound.observer.trends import thinned
+from northbound.observer.valve_view import ValvePicture
+from northbound.observer.waiting_reference import Writer
+from northbound.operator_page import facts
+from northbound.operator_page.moves_ahead import BY_LAW, Ahead
+from webpage.units import LENGTHS, Units
 
 STROKE_M = 0.1
 VALUES = dict.fromkeys(BY_NAME, 0.0) | {
@@ -199,7 +199,7 @@ def test_a_window_keeps_its_extremes_and_its_gaps() -> None:
 
 
 def test_a_role_ends_by_itself() -> None:
-    from positioner.pages.operator_page.signed_in import SIGNED_IN_S, SignedIn  # the page's library, with it
+    from northbound.operator_page.signed_in import SIGNED_IN_S, SignedIn  # the page's library, with it
 
     signed = SignedIn()
     assert signed.at(0.0) is Role.OBSERVER

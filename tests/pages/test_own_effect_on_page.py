@@ -8,15 +8,15 @@ import pytest
 
 from config.errors import InputError
 from config.valve_file import valve
-from positioner.pages.workbench_page.background import Finished, News, Progressed, Work
-from positioner.pages.workbench_page.command_lines import command_lines
-from positioner.pages.workbench_page.desk import Desk
-from positioner.pages.workbench_page.opening import Opened
-from positioner.pages.workbench_page.provenance import NamedValve
 from sim.effect import FOLDERS_ALLOWED, find_effect
 from sim.own_effect import EXAMPLE, checked
 from tests.cli.test_daemon_process import until
 from tests.pages.laid_out import hidden
+from workbench.page.background import Finished, News, Progressed, Work
+from workbench.page.command_lines import command_lines
+from workbench.page.desk import Desk
+from workbench.page.opening import Opened
+from workbench.page.provenance import NamedValve
 
 TEXT = EXAMPLE.read_text(encoding="utf-8")
 

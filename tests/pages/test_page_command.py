@@ -7,9 +7,9 @@ import pytest
 
 from config.errors import CommandFailed, InputError
 from config.roles import Role
-from positioner.cli import page
+from northbound.observer.watched_valves import Place
+from northbound.operator_page import command as page
 from positioner.cli.main import command_parser, main
-from positioner.observer.watched_valves import Place
 from tests.certificates import folder
 
 VALVE = "[valve]\nname = '{name}'\nstroke_m = 0.1\n[supervisory]\nport = {port}\n[recorder]\nfolder = 'rec'\n"

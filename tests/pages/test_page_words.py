@@ -5,11 +5,11 @@ from pathlib import Path
 import pytest
 
 from config.errors import InputError
-from config.exports.column_mapping import read_mapping
-from config.exports.export_preview import preview
-from config.historian_export import read_export
-from positioner.pages.parts.page_words import in_page_words
+from webpage.page_words import in_page_words
 from workbench.data.noise_floor import UNKNOWN
+from workbench.imports.column_mapping import read_mapping
+from workbench.imports.export_preview import preview
+from workbench.imports.historian_export import read_export
 
 
 def test_a_noise_that_is_not_known_is_said_in_the_file() -> None:

@@ -20,17 +20,17 @@ from config.recording import Recording, write_recording
 from config.valve_file import ValveFile, load_valve
 from config.writing import valve_toml, write_valve
 from positioner.cli.main import main
-from positioner.pages.workbench_page import background
-from positioner.pages.workbench_page import desk as desk_module
-from positioner.pages.workbench_page.background import Finished, News
-from positioner.pages.workbench_page.command_lines import command_lines
-from positioner.pages.workbench_page.desk import Desk, named_valve
-from positioner.pages.workbench_page.notebook import notebook
-from positioner.pages.workbench_page.opening import Opened
-from positioner.pages.workbench_page.provenance import DataSheetMade, NamedValve
 from tests.pages.laid_out import hidden
 from workbench.diagnosis import diagnosis as diagnosis_module
 from workbench.diagnosis import extension as extension_module
+from workbench.page import background
+from workbench.page import desk as desk_module
+from workbench.page.background import Finished, News
+from workbench.page.command_lines import command_lines
+from workbench.page.desk import Desk, named_valve
+from workbench.page.notebook import notebook
+from workbench.page.opening import Opened
+from workbench.page.provenance import DataSheetMade, NamedValve
 
 TRIED = ("preload", "sensor_offset")
 ACTED, SEQUENCES = 8, 8
@@ -272,7 +272,7 @@ def test_what_a_data_sheet_and_a_blind_case_gave_goes_home_too(desk: Desk) -> No
 
 
 def test_the_report_is_of_what_was_added_not_of_what_was_found(desk: Desk) -> None:
-    from positioner.pages.workbench_page.journal_panel import write_report
+    from workbench.page.journal_panel import write_report
 
     desk.diagnose(TRIED)
     searched(desk)

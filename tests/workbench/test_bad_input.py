@@ -12,9 +12,12 @@ from positioner.cli.main import main
 from sim.composition import Composition
 from sim.open_loop import respond
 from tests.workbench.valves import NOISE_M, PERIOD_S, SEED, record_of
-from workbench import compare, diagnose, extend, fit
+from workbench.compare.comparison import compare
 from workbench.data.held_out import split
 from workbench.data.record import MOST_WORK, ready, require_fittable
+from workbench.diagnosis.diagnosis import diagnose
+from workbench.diagnosis.extension import extend
+from workbench.fit.fitting import fit
 
 Capture = pytest.CaptureFixture[str]
 Columns = dict[str, Column]

@@ -14,7 +14,7 @@ from config.valve_file import EffectTable
 from sim.composition import Composition
 from sim.open_loop import respond
 from tests.workbench.valves import NOISE_M, PERIOD_S, drawn_valve, record_of, with_effect
-from workbench import compare
+from workbench.compare.comparison import compare
 from workbench.data.record import ready
 from workbench.model.free_run import FreeRun
 

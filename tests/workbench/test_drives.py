@@ -11,8 +11,8 @@ from config.recording import Recording
 from config.valve_file import ValveFile, load_valve
 from sim.simulation import simulate
 from sim.static_inverse import extended_valve
-from workbench import compare, fit
-from workbench.compare.comparison import Comparison
+from workbench.compare.comparison import Comparison, compare
+from workbench.fit.fitting import fit
 from workbench.report.comparison_report import report_comparison
 from workbench.report.page import Subject
 

@@ -12,7 +12,7 @@ from config.valve_file import EffectTable, ValveFile, ValveParameters
 from sim.composition import Composition
 from sim.effect import shipped_effect
 from tests.workbench.valves import SEED, drawn_valve, error_of, record_of, with_effect
-from workbench import fit
+from workbench.fit.fitting import fit
 from workbench.model.parameters import free_parameters
 
 DATA = Path(__file__).parents[3] / "shared" / "data" / "servo_motor"

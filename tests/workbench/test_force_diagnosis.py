@@ -20,8 +20,8 @@ from tests.workbench.benches import (
     bench,
     benches,
 )
-from workbench import diagnose
 from workbench.data.imposed_motion import is_imposed, read_imposed
+from workbench.diagnosis.diagnosis import diagnose
 from workbench.forces.force_diagnosis import ForceDiagnosis, diagnose_forces
 from workbench.forces.force_diagnosis_json import as_json
 

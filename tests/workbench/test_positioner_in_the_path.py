@@ -6,17 +6,18 @@ import numpy as np
 import pytest
 
 from config.errors import InputError
-from config.exports.column_mapping import read_mapping
 from config.recording import Recording
 from config.valve_file import ValveFile
 from sim.composition import Composition
 from tests.sim.test_positioner import PA_PER_M, valve_file
 from tests.simulated import simulated
 from tests.workbench.valves import with_effect
-from workbench import compare, fit
+from workbench.compare.comparison import compare
 from workbench.data.held_out import split
 from workbench.data.record import ready
 from workbench.diagnosis.positioner_or_packing import ROUGH, PositionerOrPacking, cause, positioner_or_packing
+from workbench.fit.fitting import fit
+from workbench.imports.column_mapping import read_mapping
 from workbench.model.free_run import Accuracy, FreeRun
 from workbench.model.sampling import DYNAMIC
 from workbench.report import Subject, report_comparison

@@ -14,10 +14,11 @@ from config.recording import Column, Recording
 from config.valve_file import EffectTable, ValveFile
 from sim.composition import Composition
 from sim.effect import shipped_effect
-from workbench import compare, diagnose, fit
+from workbench.compare.comparison import compare
 from workbench.compare.friction_balance import forces
 from workbench.data.record import ready
-from workbench.diagnosis.diagnosis import Diagnosis
+from workbench.diagnosis.diagnosis import Diagnosis, diagnose
+from workbench.fit.fitting import fit
 from workbench.model.free_run import FreeRun
 
 QUANTUM_RAD = 2.0 * np.pi / 1e4

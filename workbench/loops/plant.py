@@ -16,8 +16,8 @@ from pathlib import Path
 import numpy as np
 
 from config.errors import InputError
-from config.exports.loop_reader import ROLES, read_loop
 from config.plain_file import read_plain
+from workbench.imports.loop_reader import ROLES, read_loop
 from workbench.loops.loop_diagnosis import LoopDiagnosis, diagnose_loop
 from workbench.loops.loop_record import LoopRecord
 from workbench.loops.oscillation import without_trend

@@ -2,6 +2,7 @@
 
 A command imports from here what it needs when it runs.
 
+    command_finder                              which commands there are, and what an extra would add
     children, simulated_plant, pseudo_line      other commands as processes, a slave and a daemon of them, a serial line
     flow_demo, flow_cases, flow_on_bus          `demo --loop flow`: what it says, its cases, one of them on wires
     demo_folder                                 where a demo leaves its files, and whose those there are
@@ -14,11 +15,8 @@ A command imports from here what it needs when it runs.
     model_arguments                             a valve file and effects, checked before the work begins
     diagnose_forces, next_step                  `diagnose` on a bench's recording; what to type after a diagnosis
     extended_valves                             `[law] valve` of a daemon's file, worked out
-    config_argument, listening_arguments        which file a command is about; where it listens
-    served_valves                               the valves of daemons' files, and by which certificates they are read
+    config_argument                             which file a command is about
     output_files                                what `--out` and `--json` ask for
-    register_readers                            the register map as configurations of programs that read it:
-    telegraf, modbus_exporter, home_assistant, node_red     one each
     sampling                                    when a device samples, for `doctor --nudge-pa`
     authority, progress, passing_line           a test certificate authority; progress on a terminal, in one line there
     breaking_off                                Ctrl-C during long work: what is known is said

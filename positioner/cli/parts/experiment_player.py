@@ -164,7 +164,7 @@ def last_excited(folder: Path, valve: str) -> Recording | None:
     import numpy as np
 
     from config.codes import State
-    from positioner.daemon.recorder import files_of
+    from config.recorder_files import files_of
     from workbench.data.held_out import joined
 
     newest = files_of(folder, valve)[-LATEST_FILES:]

@@ -10,8 +10,8 @@ if TYPE_CHECKING:
     from collections.abc import Callable
 
     from config.errors import InputError
-    from config.exports.column_mapping import ExportOptions
     from config.recording import Recording
+    from workbench.imports.column_mapping import ExportOptions
 
 BESIDES = ("stroke_m", "range_pa", "decimal", "time_format", "status", "sheet", "period_s")
 """Options that say how mapped columns are read."""
@@ -110,7 +110,7 @@ def take_mapping(arguments: argparse.Namespace) -> None:
     Raises:
         InputError: a fault in that file.
     """
-    from config.exports.mapping_file import read_mapping_file
+    from workbench.imports.mapping_file import read_mapping_file
 
     if arguments.mapping is None:
         return
@@ -161,7 +161,7 @@ def _refuse_loop(path: Path, error: "InputError") -> None:
         InputError: it is; names the command that reads it.
     """
     from config.errors import InputError
-    from config.exports.export_preview import preview
+    from workbench.imports.export_preview import preview
 
     if "is missing" not in error.problem:
         return
@@ -207,8 +207,8 @@ def read_mapped(
         InputError: as `read_export`; a stroke that is not positive.
     """
     from config.errors import InputError
-    from config.exports.column_mapping import read_mapping
-    from config.historian_export import read_export
+    from workbench.imports.column_mapping import read_mapping
+    from workbench.imports.historian_export import read_export
 
     if arguments.stroke_m is not None and not arguments.stroke_m > 0.0:
         raise InputError("--stroke-m", f"must be positive, it is {arguments.stroke_m:g}")
@@ -223,7 +223,7 @@ def export_options(arguments: argparse.Namespace) -> "ExportOptions":
     Raises:
         InputError: a status that says nothing.
     """
-    from config.exports.column_mapping import ExportOptions, read_status
+    from workbench.imports.column_mapping import ExportOptions, read_status
 
     return ExportOptions(
         arguments.decimal, arguments.time_format, read_status(arguments.status), arguments.sheet, arguments.period_s
@@ -232,7 +232,7 @@ def export_options(arguments: argparse.Namespace) -> "ExportOptions":
 
 def tell(who: str, recording: "Recording", stroke_m: float | None) -> None:
     """Say on standard error what was done to an export, and what is odd about it."""
-    from config.exports.plausibility import oddities
+    from config.plausibility import oddities
 
     for key, value in recording.metadata.items():
         if key != "imported":

@@ -38,7 +38,7 @@ def read_record(path: Path, arguments: argparse.Namespace) -> "LoopRecord":
         InputError: as `read_loop`; a range without width.
     """
     from config.errors import InputError
-    from config.exports.loop_reader import ROLES, read_loop
+    from workbench.imports.loop_reader import ROLES, read_loop
     from workbench.loops.loop_record import LoopRecord
 
     low, high = arguments.op_range

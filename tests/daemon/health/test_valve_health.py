@@ -14,6 +14,7 @@ from config.supervision_table import SupervisionTable
 from config.travel import Travel
 from config.valve_file import load_valve, shipped_valve
 from fieldbus.modbus.register_answers import RegisterError
+from northbound.observer.words import ne107_causes
 from positioner.control.controller_memory import Decision
 from positioner.control.requests import Requests
 from positioner.control.sample import Sample
@@ -24,7 +25,6 @@ from positioner.daemon.health.ne107 import Ne107Condition
 from positioner.daemon.health.valve_health import HealthSettings
 from positioner.daemon.supervisory_registers import SupervisoryRegisters
 from positioner.estimation.acceptance import Applied, Ratios
-from positioner.observer.words import ne107_causes
 from positioner.virtual.virtual_cycle import virtual_cycle
 from sim.slave.modbus_slave import device_of
 from tests.cases import few_always

@@ -1,0 +1,151 @@
+"""What a command is going to do to the stem, said before it is given: from where to where, by what, how long.
+
+Registers as read last, and the daemon's file where the page was given it, say so; what neither says is said to be
+unknown. Pure: no browser, no clock.
+"""
+
+import math
+from collections.abc import Iterator
+from dataclasses import dataclass
+
+from config.daemon_file import DaemonFile
+from config.travel import Travel
+from northbound.observer.valve_view import ValvePicture
+from northbound.observer.waiting_reference import Writer, waiting_reference
+from positioner.response import ResponseFigures
+from webpage.units import Units
+
+BY_LAW = {
+    "seed": "in one step of the pressure, as fast as the valve goes",
+    "slides": "in slides, each after the stem has come to rest",
+    "conventional": "gradually, as a PI controller does",
+}
+"""How a `[control] law` takes the stem to a reference; of another its name is said."""
+UNKNOWN_FILE = "the page was not given the daemon's file, which says it"
+NOBODY_KNOWS = "who wrote it is not known: the daemon keeps no history, or not where this page can read it"
+
+
+@dataclass(frozen=True, slots=True)
+class Ahead:
+    """What is known of one valve when somebody is about to move it."""
+
+    picture: ValvePicture
+    stroke_m: float
+    units: Units
+    settings: DaemonFile | None = None
+    writer: Writer | None = None
+    """Of the reference."""
+    response: ResponseFigures | None = None
+    """Of the last moves."""
+
+    @property
+    def stands(self) -> str:
+        """Where the stem stands."""
+        return self._position(self.picture.value("position"))
+
+    @property
+    def waits(self) -> str:
+        """The reference that waits; empty where none does."""
+        waiting = waiting_reference(self.picture.values)
+        return "" if waiting is None else self._position(waiting)
+
+    def automatic(self) -> list[str]:
+        """Say what automatic is going to do."""
+        waiting = waiting_reference(self.picture.values)
+        if waiting is None:
+            return [f"The stem stands at {self.stands}. No other reference waits: it stays there until one is written."]
+        way = waiting - self.picture.value("position")
+        wrote = f"written by {self.writer.words}" if self.writer else NOBODY_KNOWS
+        return [
+            f"The stem stands at {self.stands}. The reference is {self.waits}: {wrote}.",
+            f"Going there moves the stem by {way:+.1%} of its stroke{self._length(way)}.",
+            f"How long: {self._how_long()}.",
+            "Staying writes the stem's own place as the reference. Whoever writes another then moves the valve.",
+        ]
+
+    def manual(self, pressure_pa: float) -> list[str]:
+        """Say what a pressure by hand is going to do."""
+        now_pa, shown = self.picture.value("command"), self.units.pressure.text
+        lines = [f"The command goes from {shown(now_pa)} to {shown(pressure_pa)} at once, and stays there."]
+        if math.isfinite(self._balance()[0]):
+            there = self._rests(pressure_pa)
+            lines.append(
+                f"By what is identified the stem comes to about {self._position(there)}, give or take friction."
+            )
+        else:
+            lines.append("How far the stem goes is not known before the valve is identified.")
+        return lines
+
+    def identification(self) -> list[str]:
+        """Say what an identification is going to do."""
+        return [
+            *self._excitation(),
+            "Then the law has the command again. Where the stem is by then it may stay until the next reference.",
+        ]
+
+    def _excitation(self) -> Iterator[str]:
+        if self.settings is None:
+            yield f"Whether a sine or a staircase of slides moves the stem, how far and how long: {UNKNOWN_FILE}."
+            return
+        table = self.settings.excitation
+        if self.settings.by_slides:
+            low, high = map(self._position, table.travel_window)
+            yield f"From {self.stands} a staircase of pressures takes the stem up and down between {low} and {high}."
+            yield "How far each step takes it is not known before: the first are small, and grow until it slides."
+            yield f"How long: until slides of both directions agree, at most {table.staircase_limit_s:g} s."
+        else:
+            yield from self._sine(table.limit_s)
+        if table.permitted_travel is not None:
+            low, high = map(self._position, table.permitted_travel)
+            yield f"Beyond {low} to {high} it is broken off."
+
+    def _sine(self, limit_s: float) -> Iterator[str]:
+        alpha_pa, beta_pa, omega = (self.picture.value(name) for name in ("alpha", "beta", "omega"))
+        shown = self.units.pressure.text
+        about = shown(alpha_pa) if alpha_pa > 0 else "what keeps the stem where it is"
+        yield f"The pressure swings by ±{shown(beta_pa)} about {about}, {2 * math.pi / omega:.3g} s a period."
+        slope, _ = self._balance()
+        if not math.isfinite(slope):
+            yield "How far the stem goes is not known before the valve is identified."
+        elif alpha_pa > 0:
+            ends = sorted(self._rests(alpha_pa + sign * beta_pa) for sign in (-1, 1))
+            low, high = map(self._position, ends)
+            yield f"The stem stands at {self.stands}, and goes into the range from {low} to {high}."
+        else:
+            most = beta_pa / slope / self.stroke_m
+            yield f"The stem goes at most ±{most:.1%} of its stroke{self._length(most)} about {self.stands}."
+        yield f"How long: until friction and spring are identified, at most {limit_s:g} s."
+
+    def _rests(self, pressure_pa: float) -> float:
+        """Return the opening at which spring and pressure balance."""
+        slope, offset_pa = self._balance()
+        closes = self.settings is not None and self.settings.valve.travel.closes
+        opening = Travel(self.stroke_m, closes).opening((pressure_pa - offset_pa) / slope)
+        return min(max(opening, 0.0), 1.0)
+
+    def _balance(self) -> tuple[float, float]:
+        """Return the pressure that balances the spring, Pa/m, and its offset, Pa; NaN before they are identified."""
+        offset_pa = self.picture.value("offset_applied")
+        return abs(self.picture.value("b_over_c_applied")), 0.0 if math.isnan(offset_pa) else offset_pa
+
+    def _how_long(self) -> str:
+        law = "" if self.settings is None else self.settings.control.law
+        how = BY_LAW.get(law, f"as its law does, {law}") if law else UNKNOWN_FILE
+        return f"{how}; {self._last_move()}"
+
+    def _last_move(self) -> str:
+        """Say what the last move that was seen took."""
+        for step in reversed(self.response.steps if self.response else ()):
+            if step.t86_s.value is not None and step.travel_m.value is not None:
+                went = abs(step.travel_m.value / self.stroke_m)
+                return f"the last move seen, of {went:.0%}, took {step.t86_s.value:.2g} s (T86)"
+        return "no move has been seen lately"
+
+    def _position(self, position_pu: float) -> str:
+        return self.units.position_unit(self.stroke_m, turns=self.picture.turns).text(position_pu * self.stroke_m)
+
+    def _length(self, part: float) -> str:
+        """Return a part of the stroke as a length, in brackets; empty where the stroke is not known."""
+        if not math.isfinite(self.stroke_m):
+            return ""
+        return f" ({self.units.length_unit(turns=self.picture.turns).text(abs(part) * self.stroke_m)})"

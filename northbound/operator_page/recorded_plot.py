@@ -1,0 +1,110 @@
+"""The last minutes as they were recorded, to zoom into: what is shown is thinned to the screen, what is zoomed is not.
+
+The browser has the least and the greatest of each step of what it shows; zoomed in, the server sends that stretch anew,
+down to every sample that the daemon took.
+"""
+
+import math
+from typing import Any
+
+import numpy as np
+from nicegui import events, ui
+
+from config.recording import Column, Recording
+from northbound.observer.trends import thinned
+from northbound.operator_page.marks import DASHES
+from webpage.theme import Theme
+from webpage.units import Unit, Units
+
+MOST_STEPS = 1500
+"""Of what is shown; two rows a step at most."""
+ZOOM_EVERY_S = 0.2
+COLUMNS = ("reference_m", "position_m")
+
+
+class RecordedPlot:
+    """Position and reference of a recording in one tab; empty until there is one."""
+
+    def __init__(self, theme: Theme, units: Units) -> None:
+        self._theme = theme
+        self._units = units
+        self._columns: dict[str, Column] = {}
+        self._stroke_m, self._turns = math.nan, False
+        self._unit = Unit("", 1.0, 0)
+        self._chart = ui.echart({}).classes("full-width").style("height: 240px")
+        self._chart.props('data-testid="recorded" role="img" aria-label="the last minutes as recorded"')
+        self._chart.on("chart:datazoom", self._zoomed, args=["start", "end", "batch"], throttle=ZOOM_EVERY_S)
+        self._chart.set_visibility(False)
+        theme.listen(self.redraw)
+
+    def show(self, recording: Recording, stroke_m: float) -> None:
+        """Show a recording, all of it."""
+        nothing = np.full(len(recording), math.nan)
+        self._columns = {"time_s": recording.time_s} | {name: recording.columns.get(name, nothing) for name in COLUMNS}
+        self._stroke_m, self._turns = stroke_m, recording.kind.turns
+        self._chart.set_visibility(True)
+        self.redraw()
+
+    def redraw(self) -> None:
+        """Draw it in the colours and the units that are chosen now, if there is anything to draw."""
+        if self._chart.is_deleted or not self._columns:
+            return
+        self._unit = self._units.position_unit(self._stroke_m, turns=self._turns)
+        self._chart.options.clear()
+        self._chart.options.update(self._whole())
+        self._chart.update()
+
+    def _zoomed(self, event: events.GenericEventArguments) -> None:
+        told = (event.args.get("batch") or [event.args])[0]
+        begin, end = float(told["start"]) / 100, float(told["end"]) / 100
+        time_s = self._columns["time_s"]
+        span_s = float(time_s[-1] - time_s[0])
+        margin = end - begin
+        rows = self._rows(time_s[0] + (begin - margin) * span_s, time_s[0] + (end + margin) * span_s)
+        self._chart.run_chart_method("setOption", {"dataset": {"source": rows, "sourceHeader": False}})
+
+    def _rows(self, begin_s: float, end_s: float) -> list[list[float]]:
+        """Return what lies between two times, the end of the recording at 0 s."""
+        time_s = self._columns["time_s"]
+        inside = (time_s >= begin_s) & (time_s <= end_s)
+        part = {name: column[inside] for name, column in self._columns.items()}
+        if not len(part["time_s"]):
+            return []
+        step_s = (part["time_s"][-1] - part["time_s"][0]) / MOST_STEPS
+        if len(part["time_s"]) > 2 * MOST_STEPS:
+            part = thinned(part, step_s)
+        lines = [np.round(self._unit.per_si * part[name], 4) for name in COLUMNS]
+        rows: list[list[float]] = np.column_stack([np.round(part["time_s"] - time_s[-1], 5), *lines]).tolist()
+        return rows
+
+    def _whole(self) -> dict[str, Any]:
+        ink, time_s = self._theme.ink, self._columns["time_s"]
+        quiet = {"axisLabel": {"color": ink.quiet}, "splitLine": {"lineStyle": {"color": ink.grid}}}
+        ends = {"axisLabel": {"color": ink.quiet, "showMinLabel": False}, "axisLine": {"onZero": False}}
+        titled = {"nameTextStyle": {"color": ink.quiet, "align": "left", "padding": [0, 0, 0, -40]}, "nameGap": 8}
+        zoom = {"xAxisIndex": 0, "filterMode": "none"}
+        return {
+            "animation": False,
+            "tooltip": {"trigger": "axis", "backgroundColor": ink.paper, "textStyle": {"color": ink.text}},
+            "legend": {"top": 0, "left": 0, **DASHES, "textStyle": {"color": ink.text}},
+            "grid": {"left": 52, "right": 12, "top": 52, "bottom": 64},
+            "dataset": {"source": self._rows(time_s[0], time_s[-1]), "sourceHeader": False},
+            "xAxis": {"type": "value", "min": float(time_s[0] - time_s[-1]), "max": 0, "name": "s", **quiet, **ends},
+            "yAxis": {"scale": True, "name": f"position, {self._unit.name}", **titled, **quiet, **ends},
+            "dataZoom": [{"type": "inside", **zoom}, {"type": "slider", "height": 20, "bottom": 8, **zoom}],
+            "series": [
+                {
+                    "type": "line",
+                    "name": name,
+                    "encode": {"x": 0, "y": number},
+                    "showSymbol": False,
+                    "step": "end" if dash == "dashed" else False,
+                    "z": 3 if dash == "dashed" else 2,
+                    "lineStyle": {"color": colour, "width": 1.5, "type": dash},
+                    "itemStyle": {"color": colour},
+                }
+                for number, (name, colour, dash) in enumerate(
+                    (("reference", ink.model, "dashed"), ("position", ink.measured, "solid")), start=1
+                )
+            ],
+        }

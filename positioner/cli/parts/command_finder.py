@@ -1,0 +1,116 @@
+"""Which commands there are: the roof's own, and those that rooms and other packages bring by entry points.
+
+    [project.entry-points."positioner.commands"]
+    page = "northbound.operator_page.command [web]"
+
+The module has `HELP`, `EXAMPLE`, `add_arguments` and `run`; in brackets stands the extra that it needs. Only the
+command that is asked for is imported, or, for a list of all, those whose extra is installed.
+"""
+
+import importlib
+from dataclasses import dataclass
+from functools import cached_property
+from importlib.metadata import EntryPoint
+from importlib.util import find_spec
+from typing import Any
+
+from config.errors import InputError
+from config.extras import EXTRAS
+from config.offered import offered, origin
+
+GROUP = "positioner.commands"
+COMMANDS = {
+    "demo": "sim,plot",
+    "sim": "sim,plot",
+    "run": "",
+    "probe": "",
+    "doctor": "",
+    "get": "",
+    "set": "",
+    "identify": "",
+    "commission": "",
+    "signature": "",
+    "pst": "",
+    "cst": "",
+    "steps": "",
+    "report": "",
+    "discriminate": "sim,plot",
+    "map": "",
+    "health": "",
+    "alarms": "",
+    "events": "",
+    "import": "",
+    "valve": "",
+    "simulate": "sim,plot",
+    "export": "sim,plot",
+    "play": "sim,plot",
+    "estimate": "",
+    "response": "",
+    "compare": "sim,plot",
+    "diagnose": "sim,plot",
+    "discover": "sim,plot",
+    "extend": "sim,plot",
+    "fleet": "fleet",
+    "loop": "sim,plot",
+    "loops": "sim,plot",
+    "reproduce": "sim,plot",
+    "hide": "sim,plot",
+    "certificates": "tls",
+    "completion": "completion",
+}
+"""The roof's own, in the order of `positioner --help`, each with the extras that it needs."""
+MODULES = {"import": "import_recording", "valve": "valve_from_data_sheet"}
+"""Files of commands whose name is taken: by the language, by another file."""
+
+
+@dataclass(frozen=True)
+class Command:
+    """A command, not yet imported."""
+
+    name: str
+    extra: str
+    entry: EntryPoint | None
+
+    @cached_property
+    def module(self) -> Any:
+        """The module, imported.
+
+        Raises:
+            InputError: another package's cannot be loaded; says whose it is and why.
+        """
+        if self.entry is None:
+            return importlib.import_module(f"positioner.cli.{MODULES.get(self.name, self.name)}")
+        try:
+            return self.entry.load()
+        except Exception as error:  # somebody else's module: anything may be wrong in it
+            raise InputError(origin(self.entry), f"command {self.name!r} cannot be loaded: {error}") from None
+
+    @property
+    def lacks(self) -> str:
+        """What to install for it; empty where everything is there."""
+        needed = [module for module, extra in EXTRAS.items() if extra == self.extra]
+        if all(find_spec(module) for module in needed):
+            return ""
+        return f"needs more: pip install 'positioner[{self.extra}]'"
+
+
+def all_commands() -> dict[str, Command]:
+    """Return all commands by name, the roof's first.
+
+    Raises:
+        InputError: two packages bring the same name.
+    """
+    own = {name: Command(name, extra, None) for name, extra in COMMANDS.items()}
+    brought = offered(GROUP, "command").items()
+    return {name: Command(name, ",".join(entry.extras), entry) for name, entry in brought} | own
+
+
+def commands_for(words: list[str]) -> list[Command]:
+    """Return the command that begins a command line, or else all, for a list of them."""
+    first = words[0] if words else ""
+    if first in COMMANDS:
+        return [Command(first, COMMANDS[first], None)]
+    every = all_commands()
+    if first in every:
+        return [every[first]]
+    return [every[name] for name in (*COMMANDS, *(each for each in sorted(every) if each not in COMMANDS))]

@@ -1,0 +1,120 @@
+"""What a file holds, and the words that may read it: looked at by the code that reads it."""
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+from pathlib import Path
+
+from config.results.block import Block, Table, as_text
+from workbench.imports.cell_kinds import numbers_of
+from workbench.imports.column_preview import ColumnPreview, columns_of, columns_of_all, guessed, shown, shown_decimal
+from workbench.imports.control_loop import LoopColumn, LoopColumns, loops_of
+from workbench.imports.file_kind import raw_tables
+from workbench.imports.header_search import SHOWN, Header
+from workbench.imports.proposal import is_clock, proposal, quoted
+from workbench.imports.raw_table import RawTable
+
+FIRST = 3
+"""Cells of a column that are shown."""
+MOST_TABLES = 5
+
+
+@dataclass(frozen=True, slots=True)
+class ExportPreview:
+    """What a file holds.
+
+    Attributes:
+        what: how it was taken.
+        header: where its columns are named, or that they are not.
+        columns: in their order.
+        words: what would read it, words of the command line; none of a loop's without a stem.
+        open: what a person must say or look at.
+        loops: the loops that it is of.
+    """
+
+    what: str
+    header: str
+    columns: tuple[ColumnPreview, ...]
+    words: tuple[str, ...]
+    open: tuple[str, ...]
+    loops: tuple[LoopColumns, ...] = ()
+
+    def summary(self) -> str:
+        """Say the columns, the proposal and what is open."""
+        return as_text(self._blocks())
+
+    def _blocks(self) -> list[Block]:
+        rows = [
+            (each.name, each.unit or "", *(shown(cell) for cell in (*each.cells, "", "", "")[:FIRST]))
+            for each in self.columns
+        ]
+        proposed = " ".join(map(quoted, self.words))
+        return [
+            f"{self.what}; {self.header}",
+            Table(("column", "unit", "first", "values", ""), rows),
+            *self.open,
+            f"proposed, look at it: {proposed}" if proposed else "nothing is proposed",
+        ]
+
+
+def preview(path: Path, sheet: str | None = None) -> ExportPreview:
+    """Return what a file holds, and the words of a command line that may read it.
+
+    Raises:
+        InputError: it cannot be read or holds no table.
+    """
+    tables = raw_tables(path, sheet)
+    header = guessed(path, tables)
+    columns = columns_of(header)
+    besides = _besides(header.table, tables)
+    words, open_ = proposal(columns, header.table.separator)
+    if header.table.sheet and not _reads(words):
+        of_all = columns_of_all(tables, header)
+        wider = proposal(of_all, header.table.separator)
+        if _reads(wider[0]):
+            columns, (words, open_), besides = of_all, wider, []
+    decimal, _ = shown_decimal(columns, header.table.separator)
+    loops = tuple(loops_of([_of_loop(each, decimal) for each in columns if each.numbers and not is_clock(each)]))
+    if loops and not any(each.position for each in loops):
+        words, open_ = (), tuple(_no_stem(path, each) for each in loops)
+    return ExportPreview(_what(header, tables), _place(header), tuple(columns), words, (*open_, *besides), loops)
+
+
+def _reads(words: Sequence[str]) -> bool:
+    """Whether words name a position and what is asked of it."""
+    ours = {word.partition("=")[0] for word in words if "=" in word}
+    return len(ours - {"time_s"}) > 1
+
+
+def _what(header: Header, tables: Sequence[RawTable]) -> str:
+    if not header.table.sheet or len(tables) < 2:
+        return header.table.what
+    return f"{header.table.what} of {', '.join(repr(each) for each in dict.fromkeys(each.sheet for each in tables))}"
+
+
+def _place(header: Header) -> str:
+    if header.line:
+        return f"{header.table.place} {header.line} names the columns"
+    return "no line names the columns" if header.names[0] == "#1" else "its columns"
+
+
+def _of_loop(column: ColumnPreview, decimal: str) -> LoopColumn:
+    """Return a column as a loop's are recognised."""
+    unit = column.unit or next(iter(column.units_behind), "") or column.unknown
+    return LoopColumn(column.name, unit, numbers_of(column.cells, decimal))
+
+
+def _no_stem(path: Path, loop: LoopColumns) -> str:
+    """Return what to say of a loop whose stem is not measured."""
+    return (
+        f"{loop.because}: this is a loop, not a stem, and {loop.process_value!r} is compared with nothing; "
+        f"`positioner loop {path}` says from it whether the valve sticks; a model needs the stem's own position (ZT, "
+        "travel, feedback) beside the command"
+    )
+
+
+def _besides(shown: RawTable, tables: Sequence[RawTable]) -> list[str]:
+    """Return what the other tables of a measurement file hold, which are of other times than the one that is shown."""
+    others = [each for each in tables if each is not shown and each.length and each.place == "row"]
+    named = [f"{each.what}: {', '.join(map(str, next(each.rows())[1][:SHOWN]))}" for each in others[:MOST_TABLES]]
+    more = [f"and {len(others) - MOST_TABLES} more"] if len(others) > MOST_TABLES else []
+    return ["of other times, not shown: " + each for each in (*named, *more)]

@@ -1,0 +1,147 @@
+"""A control loop's export read: time, OP, PV, SP and mode, in whatever units the plant has, NaN where there is none.
+
+The columns are those that `control_loop` recognises, unless a person names them. OP must be in %: another range
+(counts, mA) is said by a person and never guessed.
+"""
+
+import re
+from collections.abc import Mapping
+from dataclasses import dataclass, field
+from pathlib import Path
+
+import numpy as np
+import numpy.typing as npt
+
+from config.errors import InputError
+from workbench.imports.cell_kinds import numbers_of
+from workbench.imports.column_clock import clock_of
+from workbench.imports.control_loop import LEAST_SHARE, MOST_SHARE, LoopColumns
+from workbench.imports.export_preview import ExportPreview, preview
+from workbench.imports.file_kind import raw_tables
+from workbench.imports.header_search import find_header
+from workbench.imports.number_notation import decimal_sign
+from workbench.imports.sample_rows import collected
+from workbench.imports.time_order import in_order
+
+Array = npt.NDArray[np.float64]
+MODE = re.compile(r"mode|betriebsart|auto", re.IGNORECASE)
+MANUAL = re.compile(r"^(m|man|manual|hand|0|off|iman|track\w*)$", re.IGNORECASE)
+"""Modes in which the controller is not in charge."""
+TIME = re.compile(r"time|zeit|stamp|date|datum|^ts?\b", re.IGNORECASE)
+ROLES = ("time", "op", "pv", "sp", "mode")
+
+
+@dataclass(frozen=True, slots=True)
+class LoopSamples:
+    """A loop's samples as they were read, (n,) each.
+
+    Attributes:
+        name: the loop's tag, or the file's name.
+        time_s: from the first sample.
+        op_pct, pv, sp: as recorded; sp None where there is none.
+        automatic: where the mode is none of manual; None where no mode is on record.
+        notes: what was put right.
+    """
+
+    name: str
+    time_s: Array
+    op_pct: Array
+    pv: Array
+    sp: Array | None
+    automatic: npt.NDArray[np.bool_] | None
+    notes: Mapping[str, str] = field(default_factory=dict)
+
+
+def read_loop(
+    path: Path,
+    named: Mapping[str, str] | None = None,
+    op_range: tuple[float, float] = (0.0, 100.0),
+    time_format: str | None = None,
+    decimal: str | None = None,
+) -> LoopSamples:
+    """Read a loop.
+
+    Args:
+        path: any export.
+        named: columns by role, of `ROLES`, that a person names.
+        op_range: what the file has for 0 % and 100 % of the output.
+        time_format: how dates are written.
+        decimal: the decimal sign; None: as the numbers show.
+
+    Raises:
+        InputError: the file cannot be read, no loop or several are recognised, or OP is no share; says what to type.
+    """
+    roles = dict(named or {})
+    loop = None if {"time", "op", "pv"} <= set(roles) else _recognised(path, roles)
+    header = find_header(path, raw_tables(path), list(dict.fromkeys(roles.values())))
+    samples = collected(path, header, roles["time"], lambda _what, _done: None)
+    cells = {role: samples.cells[theirs] for role, theirs in roles.items()}
+    texts = [cell for role in ("op", "pv") for cell in cells[role] if isinstance(cell, str)]
+    decimal = decimal or decimal_sign(str(path), texts, header.table.separator)
+    clock = clock_of(path, samples, roles["time"], None, time_format, decimal)
+    values = [numbers_of(cells[role], decimal) for role in ("op", "pv", "sp") if role in roles]
+    manual = np.array([MANUAL.match(str(each).strip()) is not None for each in cells.get("mode", [])])
+    if manual.size:
+        values.append(manual.astype(np.float64))
+    local_from_s = clock.origin_s if clock.local else None
+    time_s, rows, notes = in_order(
+        path, clock.time_s, values, samples.lines, local_from_s=local_from_s, daily=clock.daily
+    )
+    low, high = op_range
+    op_pct = 100.0 * (values[0][rows] - low) / (high - low)
+    known = op_pct[np.isfinite(op_pct)]
+    if known.size and (known.min() < LEAST_SHARE or known.max() > MOST_SHARE):
+        raise InputError(
+            str(path),
+            f"output {roles['op']!r} goes from {known.min():g} to {known.max():g}: no share in %; say what it has at "
+            "0 % and 100 %, as --op-range 0 27648",
+        )
+    name = loop.tag if loop is not None and loop.tag else path.stem
+    return LoopSamples(
+        name,
+        time_s - time_s[0],
+        op_pct,
+        values[1][rows],
+        values[2][rows] if "sp" in roles else None,
+        ~manual[rows] if manual.size else None,
+        samples.notes | notes,
+    )
+
+
+def _recognised(path: Path, roles: dict[str, str]) -> LoopColumns | None:
+    """Fill in the roles that nobody named; return the loop they are of.
+
+    Raises:
+        InputError: none is recognised, or several are.
+    """
+    found = preview(path)
+    names = ", ".join(each.name for each in found.columns)
+    say = f"say --time NAME --op NAME --pv NAME (--sp, --mode); there are: {names}"
+    if len(found.loops) > 1:
+        tags = ", ".join(each.tag for each in found.loops)
+        raise InputError(str(path), f"holds {len(found.loops)} loops, {tags}: {say}")
+    loop = found.loops[0] if found.loops else None
+    if loop is None and not {"op", "pv"} <= set(roles):
+        raise InputError(str(path), f"no loop is recognised by names and ranges: {say}")
+    if loop is not None and loop.position and not roles:
+        raise InputError(
+            str(path),
+            f"{loop.position!r} is a stem's position: `positioner diagnose` reads it; for the loop alone {say}",
+        )
+    known = _mode_and_time(found)
+    if loop is not None:
+        known |= {"op": loop.output, "pv": loop.process_value} | ({"sp": loop.setpoint} if loop.setpoint else {})
+    for role, theirs in known.items():
+        roles.setdefault(role, theirs)
+    if "time" not in roles:
+        raise InputError(str(path), f"no column looks like a time: {say}")
+    return loop
+
+
+def _mode_and_time(found: ExportPreview) -> dict[str, str]:
+    known = {}
+    for role, words in (("time", TIME), ("mode", MODE)):
+        named = [each.name for each in found.columns if words.search(each.name)]
+        if named:
+            known[role] = named[0]
+    return known

@@ -1,0 +1,31 @@
+"""`positioner workbench`: the workbench as a page in a browser."""
+
+import argparse
+from pathlib import Path
+
+from webpage.listening_arguments import add_listening, listening
+
+HELP = "open the workbench in a browser: drop a recording, drag parameters, diagnose, add what is missing"
+EXAMPLE = "positioner workbench rec.csv --valve seed"
+
+
+def add_arguments(parser: argparse.ArgumentParser) -> None:
+    """Declare the command line."""
+    parser.add_argument("recordings", type=Path, nargs="*", metavar="REC", help="recordings, or folders with some")
+    parser.add_argument("--valve", metavar="VALVE.toml", help="a valve file, or a shipped valve's name")
+    add_listening(parser)
+    parser.add_argument(
+        "--password-file",
+        type=Path,
+        metavar="FILE",
+        help="the first line is the password of everybody; needed to listen beyond this machine",
+    )
+    parser.add_argument("--no-open", action="store_true", help="print the address, open no browser")
+
+
+def run(arguments: argparse.Namespace) -> int:
+    """Serve until told to end; 0."""
+    from workbench.page.page import serve_workbench
+
+    serve_workbench(arguments.recordings, arguments.valve, listening(arguments), opens_browser=not arguments.no_open)
+    return 0
