@@ -138,6 +138,7 @@ class InhibitReason(Code):
         29,
         "one direction identified: the first move the other way goes by steps, until the stem has landed",
     )
+    PRESLIDING = 30, "the packing gives way under the stem: it is moved directly, without a slide"
 
 
 class Restored(Code):

@@ -241,6 +241,8 @@ class LawTable(Schema):
 
 LEAST_DEAD_BAND = 5e-4
 """Of the stroke: finer is no use to a loop, and wears the packing."""
+EXCURSION_BUDGET = 100.0
+"""Strokes a day: a packing that is good for 100 000 of them then lasts three years."""
 
 
 class ControlTable(Schema):
@@ -259,7 +261,7 @@ class ControlTable(Schema):
     """How far the law of slides may take the stem beyond a small move, as a share of the stroke."""
     excursion_interval_s: NonNegative = 0.0
     """Least time between two such excursions."""
-    excursion_budget_strokes_per_day: NonNegative = 0.0
+    excursion_budget_strokes_per_day: NonNegative = EXCURSION_BUDGET
     """Travel of the packing that such excursions may cost, beyond that of the moves themselves; 0: no limit."""
 
     @property

@@ -1,7 +1,8 @@
 """A stem of a few equations under the law of slides, in virtual time: thousands of moves a second.
 
 A slide lands where spring and Coulomb friction balance, give or take a scatter; it begins where the balance lies
-farther ahead than the break-away distance, of going on or of turning. Nothing else of a valve is in it.
+farther ahead than the break-away distance, of going on or of turning. Until then its packing gives way in proportion.
+Nothing else of a valve is in it.
 """
 
 from collections.abc import Iterator
@@ -37,12 +38,17 @@ class ScriptedStem:
     turning_m: float
     scatter_m: float
     rng: np.random.Generator
+    gives_m_per_pa: float = 0.0
+    """How far the packing of the stuck stem gives way."""
     known_off: float = 0.0
     """By which share the law knows friction amiss."""
     position_m: float = 0.5 * STROKE_M
     direction: int = 1
     now_s: float = 0.0
     landings: list[SlideOutcome] = field(default_factory=list)
+    held: list[SlideOutcome] = field(default_factory=list)
+    stuck_m: float = field(init=False)
+    """Where it stuck last."""
     memory: SlideMemory = field(init=False)
     states: list[tuple[type, type]] = field(default_factory=list)
     commands_pa: list[float] = field(default_factory=list)
@@ -54,13 +60,13 @@ class ScriptedStem:
         long = Interval(broke_m=3.0 * self.onward_m, seen=True)  # as a staircase leaves it
         begun = self.settings.begin(held_pa).memory
         self.memory, self.commands_pa = replace(begun, distances=BreakawayDistance(long, long)), [held_pa]
-        self.answered_pa = held_pa
+        self.answered_pa, self.stuck_m = held_pa, self.position_m
 
     @property
     def balance(self) -> Balance:
         up_pa, down_pa = ((1.0 + self.known_off) * each for each in (self.up_pa, self.down_pa))
         ratios = Ratios(-SLOPE_PA_PER_M, -0.5 * (up_pa + down_pa), 0.5 * (up_pa - down_pa))
-        return Balance(ratios, tuple(self.landings[:20]), (), STROKE_M, now_s=self.now_s)
+        return Balance(ratios, tuple(self.landings[:20]), tuple(self.held[:20]), STROKE_M, now_s=self.now_s)
 
     def answer(self) -> SlideOutcome | None:
         """Let the stem answer the command in force; return what it did, None where it has answered that."""
@@ -71,18 +77,31 @@ class ScriptedStem:
         for s, friction_pa in ((1, self.up_pa), (-1, self.down_pa)):
             lands_m = (command_pa - s * friction_pa) / SLOPE_PA_PER_M
             needs_m = self.onward_m if s == self.direction else self.turning_m
-            if not self.stuck and s * (lands_m - self.position_m) >= needs_m:
+            if not self.stuck and s * (lands_m - self.stuck_m) >= needs_m:
                 off_m = float(self.rng.normal(0.0, self.scatter_m))
                 self.position_m = min(max(lands_m + off_m, 0.0), STROKE_M)
-                self.direction = s
+                self.direction, self.stuck_m = s, self.position_m
                 break
+        else:
+            self.position_m += 0.0 if self.stuck else self.gives_m_per_pa * (command_pa - answered_pa)
         s = 1 if command_pa > answered_pa else -1
-        moved = abs(self.position_m - before_m) > 5e-3 * STROKE_M
+        moved = self.stuck_m == self.position_m and abs(self.position_m - before_m) > 5e-3 * STROKE_M
         free = 0.01 * STROKE_M < self.position_m < 0.99 * STROKE_M
         went = self.direction if moved else s
-        return SlideOutcome(
-            self.now_s, went, before_m, command_pa, self.position_m, 1e-7, moved=moved, landing=moved and free
+        outcome = SlideOutcome(
+            time_s=self.now_s,
+            direction=went,
+            from_m=before_m,
+            command_pa=command_pa,
+            position_m=self.position_m,
+            std_m=1e-7,
+            moved=moved,
+            landing=moved and free,
+            from_pa=answered_pa,
         )
+        if not moved:
+            self.held.insert(0, outcome)
+        return outcome
 
     def come_free(self) -> None:
         """Let a stuck stem answer the command in force."""

@@ -29,6 +29,19 @@ def test_steps_that_stand_are_corrected_at_once() -> None:
     assert not course.takes_back(now_s, 1e-4, WAY_M, 0.0)
 
 
+def test_a_slow_ramp_is_left_to_come_until_an_excursion_saves_more_than_it_costs() -> None:
+    """0.1 mm every 20 s are no steps; what they leave is corrected where e^3 > 3/2 m^2 T v, or when they have ended."""
+    course, now_s = written([0.06 + 1e-4 * i for i in range(6)], every_s=20.0)
+    assert course.rests(now_s)
+    at_most_m = (1.5 * WAY_M**2 * 0.5 * 1e-4 / 20.0) ** (1 / 3)
+    assert course.takes_back(now_s, 0.99 * at_most_m, WAY_M, 0.5)
+    assert not course.takes_back(now_s, 1.01 * at_most_m, WAY_M, 0.5)
+    assert not course.takes_back(now_s + 30.5, 0.9 * at_most_m, WAY_M, 0.5)
+    for unlike_m in ((0.06, 0.0601, 0.0602, 0.0601, 0.0602, 0.0603), (0.06, 0.061, 0.0611, 0.062, 0.0621, 0.063)):
+        course, now_s = written(unlike_m, every_s=20.0)
+        assert not course.takes_back(now_s, 0.9 * at_most_m, WAY_M, 0.5)
+
+
 def test_errors_of_a_few_changes_are_left_until_the_reference_rests() -> None:
     course, now_s = written(NOISE_M)
     assert course.change_m == pytest.approx(2.75e-4)

@@ -23,6 +23,7 @@ PLAN = Plan(
     from_m=0.0595,
     target_m=0.06,
     quantum_m=0.0,
+    preslides=True,
     surely=False,
 )
 TURNING_IS_SHORT = replace(PLAN, distances=BreakawayDistance(LONG, LONG, SHORT, SHORT))

@@ -1,8 +1,9 @@
 """The law of slides as a machine of states, on stems drawn at random: properties, whatever the stem."""
 
 from collections import Counter
+from collections.abc import Iterator
 from dataclasses import replace
-from itertools import pairwise
+from itertools import islice, pairwise
 
 import numpy as np
 import pytest
@@ -11,9 +12,9 @@ from config.codes import InhibitReason
 from positioner.control.laws.slides import transitions
 from positioner.control.laws.slides.slide_law import SlideLaw
 from positioner.control.laws.slides.slide_memory import SlideMemory
-from positioner.control.laws.slides.states import STATES, Idle, Out, Stuck, Waiting
+from positioner.control.laws.slides.states import STATES, Idle, Out, Presliding, Stuck, Waiting
 from positioner.control.laws.slides.transitions import TABLE
-from tests.control.scripted_stem import SETTINGS, STEP_S, STROKE_M, ScriptedStem, drawn_stems
+from tests.control.scripted_stem import SETTINGS, SLOPE_PA_PER_M, STEP_S, STROKE_M, ScriptedStem, drawn_stems
 
 COUNT, MOVES = 12, 12
 
@@ -97,6 +98,27 @@ def test_whatever_interrupts_a_move_holds_what_it_is_given_and_is_taken_over_wit
             assert abs(stem.position_m - reference_m) < 1e-3 * STROKE_M
 
 
+def soft_stems(seed: int) -> Iterator[ScriptedStem]:
+    """Yield stems whose packings are 20 to 50 times as stiff as their springs."""
+    for stem in drawn_stems(COUNT, seed=seed):
+        gives = stem.rng.uniform(0.02, 0.05) / SLOPE_PA_PER_M
+        stem.gives_m_per_pa, stem.turning_m = float(gives), stem.onward_m + gives * (stem.up_pa + stem.down_pa)
+        yield stem
+
+
+def test_a_packing_that_gives_way_takes_small_moves_without_a_slide() -> None:
+    """Excursions go down by a fifth at least, and the stem ends as near."""
+    outs = Counter[str]()
+    for name, stems in (("stiff", drawn_stems(COUNT, seed=7)), ("soft", soft_stems(seed=7))):
+        for stem in islice(stems, 5):
+            for number, reference_m in enumerate(references(stem, 30)):
+                stem.now_s += 10.0 * 3 ** (number % 2)  # no ramp
+                stem.moved_to(reference_m)
+                assert abs(stem.position_m - reference_m) < 1e-3 * STROKE_M
+            outs[name] += sum(to is Out and before is not Out for before, to in stem.states)
+    assert outs["soft"] < 0.8 * outs["stiff"]
+
+
 def test_every_rule_of_the_table_is_followed_and_no_other_way_is_gone(monkeypatch: pytest.MonkeyPatch) -> None:
     followed = Counter[str]()
     allowed = {(a, a) for a in STATES}
@@ -115,7 +137,7 @@ def test_every_rule_of_the_table_is_followed_and_no_other_way_is_gone(monkeypatc
 
     monkeypatch.setattr(transitions, "MOVING", tuple(counted(each) for each in transitions.MOVING))
     monkeypatch.setattr(transitions, "AT_REST", tuple(counted(each) for each in transitions.AT_REST))
-    for stem in drawn_stems(COUNT, seed=4):
+    for stem in (*drawn_stems(COUNT, seed=4), *soft_stems(seed=4)):
         walked(stem)
         own = {each for each in stem.states if each[0].__name__ != "Watching" and each[1].__name__ != "Watching"}
         assert own <= allowed

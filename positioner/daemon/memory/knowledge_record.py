@@ -37,6 +37,7 @@ class _Slide(_Record):
     moved: bool
     landing: bool
     short_m: Length = 0.0
+    from_pa: Pressure | None = None
 
 
 class _Interval(_Record):

@@ -15,6 +15,7 @@ Neither mass nor viscous friction, lag nor sampling stands in it, and a preload 
     mean_nearby                       the mean of what was seen nearby and of late
     extended_balance                  the same of a valve whose effects are known
     swing                             how far past its balance a stem swings and sticks there
+    packing_compliance                how far the packing of a stuck stem gives way
     parting                           the instant that parts landings best
     landing_shift                     was the sensor shifted while landings were gathered
     static_identification             all of it, sample by sample, and what it says of other estimates

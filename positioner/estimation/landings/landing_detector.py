@@ -79,6 +79,8 @@ class SlideOutcome(NamedTuple):
     """Whether the balance of the moving stem holds here."""
     short_m: float = 0.0
     """How far short of that balance it may have stuck behind a slow pressure: all slides alike, their mean too."""
+    from_pa: float | None = None
+    """Under which it rested before; None: it did not."""
 
 
 class Answers(NamedTuple):
@@ -144,6 +146,8 @@ class LandingDetector:
         """Whether the stem has answered that: what moves it now is something else."""
         self.answers = Answers()
         self._step_pa = 0.0
+        self._rested_pa: float | None = None
+        """The command before the last change, if the stem rested under it."""
         self._level_s = self._interval_s = self._time_s = 0.0
         self.rest: Rest | None = None
         self.quantum_m = 0.0
@@ -266,6 +270,7 @@ class LandingDetector:
             self._learn_answer(time_s - self._level_s)
         self._step_pa = step_pa if self.rest is not None else self._step_pa + step_pa
         self._running_on = self.rest is None
+        self._rested_pa = None if self.rest is None or isnan(self._level_pa) else self._level_pa
         self._from_m = nan if isnan(self._level_pa) else self._position_m if self.rest is None else self.rest.position_m
         self._sense = 1 if command_pa > self._level_pa else -1
         self._level_pa, self._level_s = command_pa, time_s
@@ -323,6 +328,7 @@ class LandingDetector:
             moved=moved,
             landing=moved and self._free_m[0] < rest.position_m < self._free_m[1],
             short_m=rest.short_m if moved else 0.0,
+            from_pa=self._rested_pa,
         )
 
 

@@ -20,6 +20,7 @@ from positioner.estimation.landings import local_balance
 from positioner.estimation.landings.extended_balance import contradicted
 from positioner.estimation.landings.landing_detector import Answers, LandingDetector, SlideOutcome, Supposed
 from positioner.estimation.landings.landing_shift import shifted
+from positioner.estimation.landings.packing_compliance import compliance
 from positioner.estimation.landings.pressure_delivered import PressureDelivered
 from positioner.estimation.landings.static_law import StaticLaw, no_static_law, static_law
 from positioner.estimation.landings.swing import balanced
@@ -160,7 +161,8 @@ class StaticIdentification:
     def _gave_way(self, outcome: SlideOutcome) -> bool:
         """Whether the packing that holds the stem gave way, for a slide by the law would have gone elsewhere.
 
-        Not for long ways, nor `IN_A_ROW` times on end: then it is the law that no longer holds.
+        Not for long ways, nor `IN_A_ROW` times on end but as the packing has given way before: then it is the law that
+        no longer holds.
         """
         law, went_m = self.law, outcome.direction * (outcome.position_m - outcome.from_m)
         if not law.valid or went_m > LONGEST_WAY * self._stroke_m:
@@ -171,6 +173,8 @@ class StaticIdentification:
         scatter_m = local_balance.scatter_m(law.ratios, self.balances, self._stroke_m)
         allowed_m = max(LIKE * abs(should_m), OFF * self._stroke_m + 3.0 * (scatter_m + outcome.std_m))
         elsewhere = abs(went_m - should_m) > allowed_m
+        if elsewhere and (gives := compliance(self.held, outcome.direction)) is not None and gives.explains(outcome):
+            return True
         self._elsewhere = self._elsewhere + 1 if elsewhere else 0
         return 0 < self._elsewhere < IN_A_ROW
 

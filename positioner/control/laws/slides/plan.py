@@ -13,6 +13,14 @@ The first of two slides leaves the way between x and r by D: an excursion. It go
 D' = max(1.02 d_s, d_-s + abs(e)), where it leaves the way between by less, D' - abs(e) < D, for turning and going on
 differ. Or where one of the two would leave the travel or the pressure limits. To 1.02 d comes what sensor and device
 round: a first slide that fell so much short would leave no way back.
+
+    c         how far a packing gives way, m/Pa        (packing_compliance.py)
+
+Where the packing gives way, a stem under p is moved directly, by u = p + e/c, as long as it holds at r:
+
+    s (u - B(r, s))/κ <= 0.9 of the longest way that held
+
+Then a slide just long enough is a way back, too: by r + s (d_s - abs(e)), and on to r by the packing alone.
 """
 
 from dataclasses import dataclass
@@ -47,6 +55,8 @@ class Plan:
     from_m: float
     target_m: float
     quantum_m: float
+    preslides: bool
+    """Whether the stem may still be moved directly."""
     surely: bool
     """Whether the next slide goes as far as has broken loose: what may do has been tried."""
 
@@ -79,6 +89,33 @@ class Plan:
         turning_m = self.bounds.thresholds.return_margin * self.breaks_loose_m(direction, turning=True)
         return max(turning_m + self.rounded_m, self.shortest_m)
 
+    def preslid_pa(self, from_m: float, from_pa: float) -> float | None:
+        """Return the pressure under which a packing gives way from a place, m, under a pressure, to the target, Pa.
+
+        None: not so far, or not for sure. It costs no travel, and one rest where an excursion takes two: it is better
+        wherever it leaves no more than a share of the error. The spring of the stuck stem is 1/c.
+        """
+        error_m, thresholds = self.target_m - from_m, self.bounds.thresholds
+        s = 1 if error_m > 0 else -1
+        if not self.preslides or abs(error_m) > thresholds.longest_giving * self.bounds.stroke_m:
+            return None
+        gives = self.balance.compliance(s)
+        if gives is None or gives.spread > thresholds.preslid_within:
+            return None
+        command_pa = from_pa + error_m / gives.m_per_pa
+        held_m = thresholds.presliding * self.interval(s, turning=False).held_m
+        holds = s * (command_pa - self.balance.pressure_pa(self.target_m, s)) <= held_m * -self.balance.ratios.b_over_c
+        return command_pa if holds and self.bounds.allows(command_pa) else None
+
+    def taken_back_by_the_packing(self) -> list[Excursion]:
+        """Return the excursion from which the packing brings the stem back, if there is one."""
+        s = 1 if self.target_m > self.from_m else -1
+        by_m = self.from_m + s * self.way_m(s)
+        beyond_m = s * (by_m - self.target_m)
+        there_pa = self.balance.slide_pa(self.from_m, by_m, s)
+        gives = beyond_m > 0.0 and self.preslid_pa(by_m, there_pa) is not None
+        return [Excursion(direction=s, by_m=by_m, beyond_m=beyond_m)] if gives else []
+
     def excursions(self, *, begun: bool) -> list[Excursion]:
         """Return the excursions by either side, first the one that leaves the way between stem and target by less.
 
@@ -92,7 +129,9 @@ class Plan:
         by_its_side = Excursion(direction=s, by_m=self.target_m + s * on_m, beyond_m=on_m)
         by_the_other = Excursion(direction=-s, by_m=self.target_m - s * round_m, beyond_m=round_m - way_m)
         leaves_m = round_m if begun else self.bounds.thresholds.other_side * by_the_other.beyond_m
-        return [by_its_side, by_the_other] if on_m <= leaves_m else [by_the_other, by_its_side]
+        both = [by_its_side, by_the_other] if on_m <= leaves_m else [by_the_other, by_its_side]
+        least_m = self.bounds.thresholds.loaded * both[0].beyond_m
+        return [*(each for each in self.taken_back_by_the_packing() if each.beyond_m <= least_m), *both]
 
     def barred(self, each: Excursion) -> InhibitReason:
         """Return which bound of the site bars an excursion; `NOTHING`: none does."""

@@ -22,6 +22,9 @@ references ask for another one. Where one slide reaches the reference itself, it
 run is corrected when half of the references kept have confirmed it, or when it has come to rest. References as far
 apart as one slide goes, max r_i - min r_i >= m, are no scatter but steps to and fro, and each of them is meant.
 
+A ramp may be written more slowly than a DCS scans. Four steps alike, in one direction, each and each interval no more
+than twice the least, are one, and of its error is left alone what two slides would cost more than they save, as above.
+
 A ramp followed by slides of a way m, for no shorter one breaks the stem loose, leaves a sawtooth. Slides that land at
 the reference leave errors of 0 to m, rms m/sqrt(3), those that land ahead of it by half of m
 
@@ -49,6 +52,8 @@ COMING = 8
 """N"""
 A_TREND = 3
 """Changes in one direction."""
+STEPS_ALIKE, ALIKE = 4, 2.0
+"""Steps that are a slow ramp; by which factor they and their intervals may differ: steps of a hand hardly do so."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -59,6 +64,8 @@ class ReferenceCourse:
     changed_s: float
     changes_m: tuple[float, ...] = ()
     intervals_s: tuple[float, ...] = ()
+    steps: tuple[tuple[float, float], ...] = ()
+    """The last changes that came after a rest, m, and the intervals before them, s; the latest first."""
 
     def after(self, now_s: float, reference_m: float) -> "ReferenceCourse":
         """Return the course with a reference, m, that is in force now; one after a long rest begins a new run."""
@@ -66,13 +73,24 @@ class ReferenceCourse:
             return self
         interval_s = now_s - self.changed_s
         if interval_s > SCAN_S:
-            return ReferenceCourse(reference_m, now_s)
+            steps = ((reference_m - self.value_m, interval_s), *self.steps)[:STEPS_ALIKE]
+            return ReferenceCourse(reference_m, now_s, steps=steps)
         return ReferenceCourse(
             reference_m,
             now_s,
             (reference_m - self.value_m, *self.changes_m)[:KEPT],
             (interval_s, *self.intervals_s)[:KEPT],
         )
+
+    def slow_ramp_m_per_s(self, now_s: float) -> float:
+        """Return the rate of a ramp that is written in steps, m/s; 0: there is none, or it has come to its end."""
+        if len(self.steps) < STEPS_ALIKE:
+            return 0.0
+        ways_m, intervals_s = zip(*self.steps, strict=True)
+        least_m, most_m = sorted((min(ways_m), max(ways_m)), key=abs)
+        alike = 0.0 < most_m / least_m <= ALIKE and max(intervals_s) <= ALIKE * min(intervals_s)
+        goes_on = now_s - self.changed_s <= OVERDUE * max(intervals_s)
+        return abs(sum(ways_m)) / sum(intervals_s) if alike and goes_on else 0.0
 
     def rests(self, now_s: float) -> bool:
         """Whether no next reference is to be waited for."""
@@ -121,7 +139,7 @@ class ReferenceCourse:
             away_s: for how long the first of two slides leaves the stem away; 0: none was given yet.
         """
         if self.rests(now_s):
-            return False
+            return abs(error_m) ** 3 <= 1.5 * way_m**2 * away_s * self.slow_ramp_m_per_s(now_s)
         if abs(error_m) <= TAKEN_BACK * self.change_m:
             return True
         coming_m = COMING * self.change_m

@@ -16,6 +16,7 @@ from positioner.estimation.acceptance import Ratios
 from positioner.estimation.landings.breakaway_distance import BreakawayDistance, Interval, Local
 from positioner.estimation.landings.extended_balance import extended_landing_pa
 from positioner.estimation.landings.landing_detector import VISIBLE, SlideOutcome
+from positioner.estimation.landings.packing_compliance import Compliance, compliance
 from positioner.estimation.landings.local_balance import bent_by_pa, landing_pa, scatter_m, sliding_pa
 from positioner.estimation.landings.short_slides import ALIKE
 
@@ -56,6 +57,10 @@ class Balance:
         if self.valve is not None:
             return extended_landing_pa(position_m, direction, self.valve, self.landings, self.now_s)
         return landing_pa(position_m, direction, self.ratios, self.landings, self.stroke_m)
+
+    def compliance(self, direction: int) -> Compliance | None:
+        """Return how far the packing gives way in a direction; None: it does not."""
+        return compliance(self.held, direction)
 
     def tried(self, way_m: float, direction: int) -> int:
         """Return how many of the last slides that landed in a direction were sent about so far, m."""

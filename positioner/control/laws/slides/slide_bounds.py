@@ -45,6 +45,15 @@ class SlideThresholds:
     """Deviations of the mean position of a rest within which an error is none."""
     noise_quanta: float = 0.6
     """Quanta within which an error is none: half by rounding, and a tenth for the mean."""
+    presliding: float = 0.9
+    """Of the longest way that held, by which a packing is loaded beyond sliding friction: what gives way may creep."""
+    preslid_within: float = 0.5
+    """Of the error, which a packing must be known to leave, lest a slide be better."""
+    loaded: float = 0.5
+    """Of another excursion, for one from which the packing takes the stem back: it leaves it loaded, so that the next
+    move has less of it."""
+    most_preslid: int = 4
+    """Direct moves for one reference: each leaves a fraction of the error before it."""
     widening: float = 1.5
     """Factor on the dead band for every two landings beyond the free ones: why the moves come to an end."""
     free_landings: int = 2

@@ -33,6 +33,8 @@ class Move:
     """When the last was."""
     last: Slide | None = None
     """The last one, if it was sent to the reference."""
+    preslid: int = 0
+    """Direct moves of it."""
     held: bool = False
     """Whether one of it has held: then the next is as long as has surely broken loose."""
 

@@ -5,6 +5,7 @@
     Sliding       one slide, on its way to the reference
     Out           the first of two: an excursion, beyond the reference or short of it
     Returning     the second of two
+    Presliding    its packing gives way under the stem, which is moved directly
     Waiting       the stem does not come to rest, or not under the pressure commanded
     Stuck         nothing breaks it loose
 
@@ -79,6 +80,16 @@ class Returning:
 
 
 @dataclass(frozen=True, slots=True)
+class Presliding:
+    """The stem is moved directly, as far as its packing gives way: to where, m, and what broke it loose if it slides."""
+
+    to_m: float
+    loose: Slide
+    """The slide that it is if it breaks loose."""
+    reason: InhibitReason = InhibitReason.PRESLIDING
+
+
+@dataclass(frozen=True, slots=True)
 class Waiting:
     """The stem is off its reference and does not come to rest, or not under what is commanded; a slide may be on."""
 
@@ -94,10 +105,10 @@ class Stuck:
 
 
 WATCHING = Watching()
-State = Watching | Idle | Sliding | Out | Returning | Waiting | Stuck
-STATES: tuple[type[State], ...] = (Watching, Idle, Sliding, Out, Returning, Waiting, Stuck)
+State = Watching | Idle | Sliding | Out | Returning | Presliding | Waiting | Stuck
+STATES: tuple[type[State], ...] = (Watching, Idle, Sliding, Out, Returning, Presliding, Waiting, Stuck)
 
 
 def slide_of(state: State) -> Slide | None:
     """Return the slide under way, of which an outcome may tell something."""
-    return None if isinstance(state, Watching | Idle | Stuck) else state.slide
+    return None if isinstance(state, Watching | Idle | Presliding | Stuck) else state.slide

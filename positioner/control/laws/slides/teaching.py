@@ -15,7 +15,7 @@ from typing import TYPE_CHECKING
 
 from positioner.control.laws.slides.slide_bounds import SlideBounds
 from positioner.control.laws.slides.slide_memory import Anchor, Move, Row, SlideMemory
-from positioner.control.laws.slides.states import Slide, slide_of
+from positioner.control.laws.slides.states import Presliding, Slide, slide_of
 from positioner.estimation.landings.breakaway_distance import Went
 from positioner.estimation.landings.landing_detector import SlideOutcome
 
@@ -26,6 +26,8 @@ if TYPE_CHECKING:
 def after_outcome(memory: SlideMemory, outcome: SlideOutcome, now: "Now") -> SlideMemory:
     """Return the memory after what a change of the command did: break-away, and where the stem stands."""
     thresholds, stroke_m = now.bounds.thresholds, now.bounds.stroke_m
+    if isinstance(memory.state, Presliding):
+        return _after_presliding(memory, memory.state, outcome, now)
     s, to_m, slide = outcome.direction, outcome.position_m, slide_of(memory.state)
     if outcome.moved and memory.row is not None and memory.row.stuck:
         memory = replace(memory, move=Move(thresholds.most_slides))
@@ -49,6 +51,19 @@ def after_outcome(memory: SlideMemory, outcome: SlideOutcome, now: "Now") -> Sli
     if not elsewhere and missed_m > max(near_m, scatter_m):
         return landed
     return _taught(landed, slide, Went(way_m, went_m, moved=True, arrived=not elsewhere), now)
+
+
+def _after_presliding(memory: SlideMemory, state: Presliding, outcome: SlideOutcome, now: "Now") -> SlideMemory:
+    """Return the memory after the packing was to give way: so far it holds, or, landed elsewhere, has broken loose."""
+    loose = state.loose
+    if not (outcome.moved and outcome.landing):
+        return _taught(memory, loose, Went(loose.way_m, 0.0, moved=False, arrived=False), now)
+    landed = replace(memory, anchor=Anchor(outcome.position_m, outcome.direction), row=None)
+    asked_m, went_m = abs(state.to_m - outcome.from_m), abs(outcome.position_m - outcome.from_m)
+    if outcome.direction != loose.direction or went_m <= now.bounds.thresholds.gone_on * asked_m:
+        return landed
+    way_m = max(loose.way_m, now.bounds.thresholds.shortest * now.bounds.stroke_m)
+    return _taught(landed, loose, Went(way_m, way_m, moved=True, arrived=True), now)
 
 
 def sent_elsewhere(memory: SlideMemory, slide: Slide, now: "Now") -> SlideMemory:

@@ -26,6 +26,7 @@ from positioner.control.laws.slides.states import (
     STATES,
     Idle,
     Out,
+    Presliding,
     Returning,
     Slide,
     Sliding,
@@ -65,6 +66,7 @@ class Now(NamedTuple):
             from_m=from_m,
             target_m=self.reference_m,
             quantum_m=self.seen.quantum_m,
+            preslides=memory.move.preslid < self.bounds.thresholds.most_preslid,
             surely=memory.move.held or memory.move.landed >= self.bounds.thresholds.tried,
         )
 
@@ -208,6 +210,22 @@ def _one_slide(memory: SlideMemory, now: Now) -> tuple[Slide, bool]:
         way_m = min(way_m, max(likely_m, plan.shortest_m - plan.rounded_m))
     to_m = now.reference_m + (0.0 if memory.course is None else plan.lead_m(memory.course, now.seen.now_s, s))
     return _slide_from(memory, from_m, to_m, s), s * (to_m - from_m) >= way_m
+
+
+def preslid(memory: SlideMemory, now: Now) -> SlideMemory | None:
+    """Move the stem directly, where its packing gives way so far without breaking loose."""
+    move, s, from_m = memory.move, _side(now), _standing_m(memory, now)
+    command_pa = now.plan(memory, from_m).preslid_pa(_rest(now).position_m, memory.command_pa)
+    if command_pa is None or command_pa == memory.command_pa:
+        return None
+    sent_m = (command_pa - now.balance.pressure_pa(now.reference_m, s)) / -now.balance.ratios.b_over_c
+    loose = _slide_from(memory, from_m, now.reference_m + sent_m, s)
+    return replace(
+        memory,
+        command_pa=command_pa,
+        state=Presliding(now.reference_m, loose),
+        move=replace(move, left=move.left - 1, preslid=move.preslid + 1),
+    )
 
 
 def taken_back(memory: SlideMemory, now: Now) -> SlideMemory | None:
@@ -399,7 +417,7 @@ class Rule(NamedTuple):
 MOVING = (
     Rule((Out,), gone_far_enough, (Returning,), "the first of two slides is far enough beyond, and goes on no more"),
     Rule(COMMANDING, reference_far_off, (Sliding,), "a new reference lies far from a stem that moves"),
-    Rule((Idle, Sliding, Out, Returning, Waiting), overdue, (Waiting, Out), "no rest for longer than any stem takes"),
+    Rule((Idle, Sliding, Out, Returning, Presliding, Waiting), overdue, (Waiting, Out), "no rest for longer than any stem takes"),
 )
 AT_REST = (
     Rule(COMMANDING, there, (Idle,), "the stem is within the dead band"),
@@ -407,6 +425,7 @@ AT_REST = (
     Rule(COMMANDING, no_slide_left, (Idle, Stuck), "the move has had its slides"),
     Rule(COMMANDING, held_where_it_stands, (), "it rests under the pressure of the slide that it would be given: held"),
     Rule(COMMANDING, one_slide, (Sliding, Returning, Idle, Stuck), "the reference is farther than break-away"),
+    Rule(COMMANDING, preslid, (Presliding,), "the packing gives way as far as the reference"),
     Rule(COMMANDING, taken_back, (Idle,), "references to come take the error back"),
     Rule(COMMANDING, excursion_waits, (Idle,), "the last excursion was too recent"),
     Rule(COMMANDING, two_slides, (Out, Idle, Stuck), "an excursion is within the site's bounds"),
