@@ -4,8 +4,8 @@
     python -m benchmarks.what_a_valve_needs --slow-ramp
 
 The seed's valve with one property at a time, on a device that samples by a clock of its own, `DEVICE_S`, 14 bits, noise
-of half a quantum. Nothing is told but stroke and pressure limits: S3 is the staircase, under either law. Steps of 0.1 to
-10 % of stroke, even in the logarithm, `STEP_S` each. Figures are of the true stem, % of stroke: its error at the end,
+of half a quantum. Nothing is told but stroke and pressure limits: S3 is the staircase, under either law. Steps of 0.1
+to 10 % of stroke, even in the logarithm, `STEP_S` each. Figures are of the true stem, % of stroke: its error at the end,
 the share of steps that end within 0.1 and 0.25 %, how far it was beyond the way between the two references, its travel
 over that of the references, and when it was last farther than 0.1 % off where it ends, s.
 
@@ -168,8 +168,7 @@ def asked(steps: int, seed: int) -> list[float]:
 
 
 HEAD = f"{'case':24}{'law':>13}" + "".join(
-    f"{each:>9}"
-    for each in ("rms", "worst", "<= 0.1", "<= 0.25", "beyond", "90 %", "travel", "s", "95 %, s")
+    f"{each:>9}" for each in ("rms", "worst", "<= 0.1", "<= 0.25", "beyond", "90 %", "travel", "s", "95 %, s")
 )
 
 
@@ -195,7 +194,8 @@ def slow_ramp(law: str, period_s: float, seed: int, written_s: float) -> str:
     ways = np.arange(written_s, RAMP_S + 0.5 * written_s, written_s) * RAMP / RAMP_S
     at = np.concatenate([before[-1:], *(loop.path(float(reference + way), written_s) for way in ways)])
     travel, off = float(np.abs(np.diff(at)).sum()), 100 * abs(at[-1] - reference - RAMP)
-    return f"{law}, written every {written_s:g} s: {100 * RAMP:g} % in {RAMP_S:g} s costs {travel:.3f} strokes, ends {off:.3f} % off"
+    asked_for = f"{law}, written every {written_s:g} s: {100 * RAMP:g} % in {RAMP_S:g} s"
+    return f"{asked_for} costs {travel:.3f} strokes, and ends {off:.3f} % off"
 
 
 def main() -> None:

@@ -12,7 +12,7 @@ from config.codes import InhibitReason
 from positioner.control.laws.slides import transitions
 from positioner.control.laws.slides.slide_law import SlideLaw
 from positioner.control.laws.slides.slide_memory import SlideMemory
-from positioner.control.laws.slides.states import STATES, Idle, Out, Presliding, Stuck, Waiting
+from positioner.control.laws.slides.states import STATES, Idle, Out, Stuck, Waiting
 from positioner.control.laws.slides.transitions import TABLE
 from tests.control.scripted_stem import SETTINGS, SLOPE_PA_PER_M, STEP_S, STROKE_M, ScriptedStem, drawn_stems
 

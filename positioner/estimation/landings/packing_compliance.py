@@ -1,4 +1,4 @@
-"""How far the packing of a stuck stem gives way: its compliance, from changes of the command that did not break it loose.
+"""How far the packing of a stuck stem gives way: its compliance, from changes of the command that held.
 
     Δx = c Δp         c = A/(k_s + k_p), k_p the packing's stiffness: less than 1/κ = A/k_s
     c  = Σ w_j Δx_j Δp_j / Σ w_j Δp_j^2,     w_j = ρ^j,  j = 0 the latest in that direction

@@ -16,8 +16,8 @@ from positioner.estimation.acceptance import Ratios
 from positioner.estimation.landings.breakaway_distance import BreakawayDistance, Interval, Local
 from positioner.estimation.landings.extended_balance import extended_landing_pa
 from positioner.estimation.landings.landing_detector import VISIBLE, SlideOutcome
-from positioner.estimation.landings.packing_compliance import Compliance, compliance
 from positioner.estimation.landings.local_balance import bent_by_pa, landing_pa, scatter_m, sliding_pa
+from positioner.estimation.landings.packing_compliance import Compliance, compliance
 from positioner.estimation.landings.short_slides import ALIKE
 
 MIDDLE = 0.5

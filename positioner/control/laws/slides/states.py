@@ -81,9 +81,10 @@ class Returning:
 
 @dataclass(frozen=True, slots=True)
 class Presliding:
-    """The stem is moved directly, as far as its packing gives way: to where, m, and what broke it loose if it slides."""
+    """The stem is moved directly, as far as its packing gives way."""
 
     to_m: float
+    """Where it is to stand."""
     loose: Slide
     """The slide that it is if it breaks loose."""
     reason: InhibitReason = InhibitReason.PRESLIDING

@@ -25,9 +25,14 @@ if TYPE_CHECKING:
 
 def after_outcome(memory: SlideMemory, outcome: SlideOutcome, now: "Now") -> SlideMemory:
     """Return the memory after what a change of the command did: break-away, and where the stem stands."""
+    state = memory.state
+    if isinstance(state, Presliding):
+        return _after_presliding(memory, state, outcome, now)
+    return _after_slide(memory, outcome, now)
+
+
+def _after_slide(memory: SlideMemory, outcome: SlideOutcome, now: "Now") -> SlideMemory:
     thresholds, stroke_m = now.bounds.thresholds, now.bounds.stroke_m
-    if isinstance(memory.state, Presliding):
-        return _after_presliding(memory, memory.state, outcome, now)
     s, to_m, slide = outcome.direction, outcome.position_m, slide_of(memory.state)
     if outcome.moved and memory.row is not None and memory.row.stuck:
         memory = replace(memory, move=Move(thresholds.most_slides))

@@ -43,6 +43,7 @@ from positioner.estimation.landings.stem_at_rest import Rest
 
 NOTHING = InhibitReason.NOTHING
 COMMANDING = tuple(each for each in STATES if each is not Watching)
+UNDER_WAY = tuple(each for each in COMMANDING if each is not Stuck)
 
 
 class Now(NamedTuple):
@@ -417,7 +418,7 @@ class Rule(NamedTuple):
 MOVING = (
     Rule((Out,), gone_far_enough, (Returning,), "the first of two slides is far enough beyond, and goes on no more"),
     Rule(COMMANDING, reference_far_off, (Sliding,), "a new reference lies far from a stem that moves"),
-    Rule((Idle, Sliding, Out, Returning, Presliding, Waiting), overdue, (Waiting, Out), "no rest for longer than any stem takes"),
+    Rule(UNDER_WAY, overdue, (Waiting, Out), "no rest for longer than any stem takes"),
 )
 AT_REST = (
     Rule(COMMANDING, there, (Idle,), "the stem is within the dead band"),
