@@ -3,11 +3,11 @@
     python -m benchmarks.what_a_valve_needs [--steps 60] [--period-ms 20] [--seed 0] [--laws slides conventional]
     python -m benchmarks.what_a_valve_needs --slow-ramp
 
-The seed's valve with one property at a time, on a device that samples by a clock of its own, `DEVICE_S`, 14 bits, noise
-of half a quantum. Nothing is told but stroke and pressure limits: S3 is the staircase, under either law. Steps of 0.1
-to 10 % of stroke, even in the logarithm, `STEP_S` each. Figures are of the true stem, % of stroke: its error at the
-end, the share of steps that end within 0.1 and 0.25 %, how far it was beyond the way between the two references, its travel
-over that of the references, and when it was last farther than 0.1 % off where it ends, s.
+The seed's valve with one property at a time, on a device that samples by a clock of its own, `DEVICE_S`, 14 bits,
+noise of half a quantum. Nothing is told but stroke and pressure limits: S3 is the staircase, under either law. Steps of
+0.1 to 10 % of stroke, even in the logarithm, `STEP_S` each. Figures are of the true stem, % of stroke: its error at the
+end, the share of steps that end within 0.1 and 0.25 %, how far it was beyond the way between the two references, its
+travel over that of the references, and when it was last farther than 0.1 % off where it ends, s.
 
 `--slow-ramp` asks for 0.12 % of stroke in 120 s, written so often, and prints what that costs in strokes.
 """
