@@ -107,16 +107,16 @@ def soft_stems(seed: int) -> Iterator[ScriptedStem]:
 
 
 def test_a_packing_that_gives_way_takes_small_moves_without_a_slide() -> None:
-    """Excursions go down by a fifth at least, and the stem ends as near."""
+    """Excursions go down by a tenth at least, and the stem ends as near."""
     outs = Counter[str]()
     for name, stems in (("stiff", drawn_stems(COUNT, seed=7)), ("soft", soft_stems(seed=7))):
-        for stem in islice(stems, 5):
+        for stem in islice(stems, 8):
             for number, reference_m in enumerate(references(stem, 30)):
                 stem.now_s += 10.0 * 3 ** (number % 2)  # no ramp
                 stem.moved_to(reference_m)
                 assert abs(stem.position_m - reference_m) < 1e-3 * STROKE_M
             outs[name] += sum(to is Out and before is not Out for before, to in stem.states)
-    assert outs["soft"] < 0.8 * outs["stiff"]
+    assert outs["soft"] < 0.9 * outs["stiff"]
 
 
 def test_every_rule_of_the_table_is_followed_and_no_other_way_is_gone(monkeypatch: pytest.MonkeyPatch) -> None:
