@@ -10,6 +10,7 @@ It defines
     STEP_S = h                      longest step over which its memory comes out well, s; FINE_STEP_S if not given, and
                                     any step without a memory; what `straight` cuts it by comes on top of that
     LOOKS = text                    what it looks like in a record
+    COMPLAINT = text                what an engineer who meets it calls it, as "sticks"
     AFTER = name                    effect that a search tries first: this one only where that has evidence and leaves
                                     something to explain
     INPUT = "setpoint"              what enters its pressure path is a set point, m, and not a pressure: a positioner
@@ -100,6 +101,8 @@ FOLDERS_ALLOWED = "POSITIONER_EFFECTS"
 SHIPPED = Path(__file__).parent / "effects"
 BALANCE = "balance"
 SETPOINT = "setpoint"
+UNKNOWN_COMPLAINT = "something new"
+"""Of an effect that says none."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -162,6 +165,8 @@ class Effect:
     equation: str
     """The first indented lines of its docstring."""
     looks: str
+    complaint: str
+    """What an engineer who meets it calls it."""
     confounded: Mapping[str, str]
     after: str
     """The effect that a search tries before it; empty: it is tried from the first."""
@@ -381,6 +386,7 @@ def _declared(path: Path, source: str) -> Effect:
         functions=functions,
         equation=_equation(said),
         looks=namespace.get("LOOKS", ""),
+        complaint=namespace.get("COMPLAINT", UNKNOWN_COMPLAINT),
         confounded=namespace.get("CONFOUNDED", {}),
         after=namespace.get("AFTER", ""),
         by_setpoint=_by_setpoint(path, namespace),
@@ -483,7 +489,7 @@ def _check_step(effect: Effect) -> None:
 
 
 def _check_words(effect: Effect) -> None:
-    for key, text in (("LOOKS", effect.looks), ("AFTER", effect.after)):
+    for key, text in (("LOOKS", effect.looks), ("COMPLAINT", effect.complaint), ("AFTER", effect.after)):
         if not isinstance(text, str):
             raise InputError(str(effect.path), f"{key}: must be a text, got {text!r}")
     is_table = isinstance(effect.confounded, dict)

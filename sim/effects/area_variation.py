@@ -9,6 +9,7 @@ from typing import Annotated, NamedTuple
 
 from sim.effect import Parameter
 
+COMPLAINT = "spring or diaphragm"
 LOOKS = "The static curve bends, the more the higher the pressure; in fast moves the pull of a pascal varies with x."
 CONFOUNDED = {
     "flow_force": "fast moves, in which the pressure parts from the static curve",

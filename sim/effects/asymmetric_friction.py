@@ -9,6 +9,7 @@ from typing import Annotated, NamedTuple
 
 from sim.effect import Parameter
 
+COMPLAINT = "sticks"
 LOOKS = (
     "Opening and closing break away at, and slide against, different forces: in open loop the stem drifts one way "
     "under a symmetric command."

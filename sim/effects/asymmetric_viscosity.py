@@ -11,6 +11,7 @@ from typing import Annotated, NamedTuple
 from sim.effect import Parameter
 
 AFTER = "asymmetric_friction"
+COMPLAINT = "sticks"
 LOOKS = "Fast moves are slower one way than the other, the more the faster; slow ramps are the same both ways."
 CONFOUNDED = {
     "asymmetric_friction": "moves at several speeds both ways: this grows with the speed, asymmetric friction does not",

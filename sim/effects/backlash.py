@@ -15,6 +15,7 @@ MEMORY = 1
 STEP_S = inf
 
 
+COMPLAINT = "play or stop"
 LOOKS = "After every reversal the indication stays while the stem already moves; a slow cycle's branches part by w."
 CONFOUNDED = {
     "presliding_hysteresis": "small cycles of growing height: a loop of the packing grows with them, a play's has one "

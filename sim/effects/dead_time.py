@@ -32,6 +32,7 @@ if only by rounding."""
 MOST_CUTS = 8
 """Of what is left of a step a bend cuts off no less than this part. Behind a lag the end of a step is a bend, which
 comes out T later and would end another step there, and so on without end."""
+COMPLAINT = "air supply or leak"
 LOOKS = "Everything is late by the same time: after each change of the command nothing happens for T, then all of it."
 CONFOUNDED = {
     "ip_lag": "the first moments after a step: the dead time answers not at all, the lag at once",

@@ -14,6 +14,7 @@ from sim.effect import Memory, Parameter
 MEMORY = 1
 STEP_S = 2e-3
 LONG_AGO_S = -1e9
+COMPLAINT = "sticks"
 LOOKS = "The longer the hold, the later the break-away and the longer the jump; sliding is untouched."
 CONFOUNDED = {
     "static_n": "holds of different lengths: static friction alone breaks away at the same force after each",

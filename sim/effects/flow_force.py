@@ -10,6 +10,7 @@ from typing import Annotated, NamedTuple
 
 from sim.effect import Parameter
 
+COMPLAINT = "flow"
 LOOKS = "The static curve bends one way over the whole travel, the same in fast moves and slow ones."
 CONFOUNDED = {
     "spring_n_per_m": "the bending of the static curve alone: travel over the whole stroke",

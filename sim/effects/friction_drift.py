@@ -11,6 +11,7 @@ from typing import Annotated, NamedTuple
 from config.extended_valve import Inverse
 from sim.effect import Parameter
 
+COMPLAINT = "drifts"
 LOOKS = "The same command is answered with a wider (or narrower) dead band later in the record than at its start."
 CONFOUNDED = {
     "dwell_stiction": "holds of different lengths in mixed order: a drift goes with time, not with the hold",

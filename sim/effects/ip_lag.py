@@ -14,6 +14,7 @@ from sim.first_order_lag import lagged
 
 MEMORY = 1
 STEP_S = 2e-3
+COMPLAINT = "air supply or leak"
 LOOKS = (
     "After a step of the command the stem starts late and gently, is fastest later and creeps into its end. The shape "
     "is the same whatever the step's height. On a ramp it runs T behind."

@@ -9,6 +9,7 @@ from typing import Annotated, NamedTuple
 
 from sim.effect import Parameter
 
+COMPLAINT = "sticks"
 LOOKS = (
     "The opening and closing branches of the static curve part over the stroke: the dead band widens towards one end."
 )

@@ -9,6 +9,7 @@ from typing import Annotated, NamedTuple
 
 from sim.effect import Parameter
 
+COMPLAINT = "spring or diaphragm"
 LOOKS = "The whole curve of position over pressure is shifted, both branches by the same pressure F_0 / A."
 CONFOUNDED = {
     "asymmetric_viscosity": "moves at several speeds both ways: a viscosity grows with the speed, this does not",

@@ -20,6 +20,7 @@ HELD, BALANCED_N = 0, 1
 """Whether the packing holds the stem, and the force it balances, F_h + k_p (x - x_h)."""
 
 
+COMPLAINT = "sticks"
 LOOKS = (
     "Small steps move the stuck stem a little, in proportion, and back again, before break-away; after a slip has "
     "stopped it gives way when the pressure turns."

@@ -31,6 +31,7 @@ LOGARITHMIC = 1e-6
 """Of n - 1."""
 
 AFTER = "presliding"
+COMPLAINT = "sticks"
 LOOKS = (
     "Small steps move the stuck stem a little before break-away. Brought back to the same pressure it does not come "
     "back to the same place. Small cycles of the pressure draw loops."

@@ -9,6 +9,7 @@ from typing import Annotated, NamedTuple
 
 from sim.effect import Parameter
 
+COMPLAINT = "sticks"
 LOOKS = "The dead band widens with the pressure at which the stem works, at any speed."
 CONFOUNDED = {
     "pressure_power_friction": "strokes at three pressures and more: the dead band's growth from each to the next",

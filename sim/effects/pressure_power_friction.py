@@ -11,6 +11,7 @@ from sim.effect import Parameter
 
 P_1_PA = 1e5
 AFTER = "pressure_friction"
+COMPLAINT = "sticks"
 LOOKS = (
     "The dead band widens with the pressure at which the stem works, at high pressures faster than at low ones, or "
     "slower."

@@ -9,6 +9,7 @@ from typing import Annotated, NamedTuple
 
 from sim.effect import Parameter
 
+COMPLAINT = "flow"
 LOOKS = "High steps are slower than low ones would have it; slow ramps are untouched."
 CONFOUNDED = {
     "viscous_ns_per_m": "moves at several speeds, from steps of different heights",

@@ -12,6 +12,7 @@ import numpy as np
 from config.extended_valve import Inverse
 from sim.effect import Parameter
 
+COMPLAINT = "lost calibration"
 LOOKS = "The indication takes few values, all a multiple of q: a slow ramp looks like a staircase of equal stairs."
 CONFOUNDED = {
     "static_n": "the heights of the stairs: the quantum's are all alike and stand at the same places, stick-slip's not",

@@ -18,6 +18,7 @@ NO_TIME_S = 1e-9
 """In which p has arrived."""
 UNLIMITED = 1e10
 """Pa/s, from which a jump is made at once."""
+COMPLAINT = "air supply or leak"
 LOOKS = (
     "High steps are answered by a ramp whose slope does not depend on the step's height. It differs between opening "
     "and closing if filling and venting do. Small steps are untouched."

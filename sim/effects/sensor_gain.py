@@ -9,6 +9,7 @@ from typing import Annotated, NamedTuple
 
 from sim.effect import Parameter
 
+COMPLAINT = "lost calibration"
 LOOKS = "Every move is indicated too long or too short by the same share."
 CONFOUNDED = {"spring_n_per_m": ""}
 INVERSE = "balance"

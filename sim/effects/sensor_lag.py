@@ -14,6 +14,7 @@ from sim.first_order_lag import lagged
 
 MEMORY = 1
 STEP_S = 2e-3
+COMPLAINT = "lost calibration"
 LOOKS = (
     "The indicated position rounds off every start and stop; after the stem has stuck it still creeps, exponentially, "
     "to its end."

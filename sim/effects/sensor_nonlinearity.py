@@ -9,6 +9,7 @@ from typing import Annotated, NamedTuple
 
 from sim.effect import Parameter
 
+COMPLAINT = "lost calibration"
 LOOKS = "The static curve is bent, both branches alike, and true at both ends."
 CONFOUNDED = {
     "spring_hardening": "the width of the dead band over the travel, which a bent sensor stretches and squeezes",

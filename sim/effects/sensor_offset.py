@@ -9,6 +9,7 @@ from typing import Annotated, NamedTuple
 
 from sim.effect import Parameter
 
+COMPLAINT = "lost calibration"
 LOOKS = "The whole record stands b too high; nothing else."
 CONFOUNDED = {
     "preload": "",

@@ -9,6 +9,7 @@ from typing import Annotated, NamedTuple
 
 from sim.effect import Parameter
 
+COMPLAINT = "spring or diaphragm"
 LOOKS = "The static curve bends: the same step of pressure moves the stem less, the further it is open."
 CONFOUNDED = {
     "flow_force": "travel to both ends: the spring bends the curve late, the flow force evenly",

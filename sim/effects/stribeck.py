@@ -12,6 +12,7 @@ from typing import Annotated, NamedTuple
 
 from sim.effect import Parameter
 
+COMPLAINT = "sticks"
 LOOKS = (
     "Stick-slip: break-away is late and the jump that follows long; steady motion slower than v_x is rough or not "
     "to be had, faster motion is untouched."

@@ -10,6 +10,7 @@ from typing import Annotated, NamedTuple
 from config.extended_valve import Inverse
 from sim.effect import Parameter
 
+COMPLAINT = "air supply or leak"
 LOOKS = "Beyond a command, always the same one, the stem answers no further, at the upper end, at the lower or both."
 CONFOUNDED = {
     "end_stop": "measured actuator pressure: the limit cuts it, a stop does not; without it, a load that moves the "

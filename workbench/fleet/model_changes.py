@@ -13,7 +13,7 @@ from config.results.block import Block, Table
 from config.results.result import Result
 from config.writing import valve_toml
 from workbench.fleet.examination import CHANGED
-from workbench.fleet.valve_course import ValveCourse, kind_of
+from workbench.fleet.valve_course import ValveCourse, complaint_of
 
 if TYPE_CHECKING:
     from matplotlib.figure import Figure
@@ -63,7 +63,7 @@ class ModelChanges(Result):
             f"since {self.since:%Y-%m-%d}: {len({each.valve for each in self.changes})} valves have another model"
         ]
         rows = [
-            (each.valve, each.name, _number(each.before), _number(each.now), _percent(each), kind_of(each.name))
+            (each.valve, each.name, _number(each.before), _number(each.now), _percent(each), complaint_of(each.name))
             for each in self.changes
         ]
         if rows:

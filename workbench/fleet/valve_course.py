@@ -12,35 +12,21 @@ from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass, field
 from datetime import datetime
 
+from config.errors import InputError
 from config.loading import validated
 from config.valve_file import ValveFile
+from sim.effect import UNKNOWN_COMPLAINT, find_effect
 from workbench.fleet.examination import AS_BEFORE, CHANGED, UNREADABLE, UNTOLD, Change, Examination
 from workbench.fleet.manifest import Entry
 
-KINDS: Mapping[str, tuple[str, ...]] = {
-    "sticks": (
-        "stribeck",
-        "dwell_stiction",
-        "asymmetric_friction",
-        "position_friction",
-        "pressure_friction",
-        "pressure_power_friction",
-        "presliding",
-        "presliding_hysteresis",
-        "asymmetric_viscosity",
-        "coulomb_n",
-        "static_n",
-        "viscous_ns_per_m",
-    ),
-    "drifts": ("friction_drift",),
-    "lost calibration": ("sensor_gain", "sensor_offset", "sensor_nonlinearity", "sensor_lag", "quantisation"),
-    "play or stop": ("backlash", "end_stop"),
-    "air supply or leak": ("supply_limit", "rate_limit", "ip_lag", "dead_time"),
-    "spring or diaphragm": ("preload", "spring_hardening", "area_variation", "spring_n_per_m"),
-    "flow": ("flow_force", "quadratic_drag"),
+STICKS, SPRING_OR_DIAPHRAGM = "sticks", "spring or diaphragm"
+COMPLAINTS: Mapping[str, str] = {
+    "coulomb_n": STICKS,
+    "static_n": STICKS,
+    "viscous_ns_per_m": STICKS,
+    "spring_n_per_m": SPRING_OR_DIAPHRAGM,
 }
-"""What an engineer calls it, by the effect that is missing or the parameter that changed."""
-UNKNOWN_KIND = "something new"
+"""What an engineer calls a parameter of the bare valve that changed; an effect says it itself."""
 NOT_JUDGED, NOTHING_KNOWN = "not judged", "nothing known"
 JUDGED = ("missing", "one_of", "unexplained", CHANGED)
 """Outcomes that say what it is, or that the library has nothing for it."""
@@ -125,9 +111,9 @@ class ValveCourse:
         if self.gravest is None:
             return "" if self.readable else NOTHING_KNOWN
         _, found = self.gravest
-        kinds = [kind_of(name) for name in found.effects] or kinds_of_changes(found.changes)
+        kinds = [complaint_of(name) for name in found.effects] or kinds_of_changes(found.changes)
         return ", ".join(dict.fromkeys([*(["drifts"] if self.drifting else []), *kinds])) or (
-            UNKNOWN_KIND if found.outcome in JUDGED else NOT_JUDGED
+            UNKNOWN_COMPLAINT if found.outcome in JUDGED else NOT_JUDGED
         )
 
     @property
@@ -174,10 +160,14 @@ class ValveCourse:
         return next((each.text for each in reversed(self.models) if each.when <= time), None)
 
 
-def kind_of(name: str) -> str:
-    """Return what an engineer calls an effect, or a parameter that changed."""
-    effect = name.partition(".")[0]
-    return next((kind for kind, names in KINDS.items() if effect in names), UNKNOWN_KIND)
+def complaint_of(name: str) -> str:
+    """Return what an engineer calls an effect, one of its parameters, or one of the bare valve that changed."""
+    if name in COMPLAINTS:
+        return COMPLAINTS[name]
+    try:
+        return find_effect(name if name.endswith(".py") else name.partition(".")[0], "model").complaint
+    except InputError:  # one of a person's own whose file is elsewhere; another number of the data sheet
+        return UNKNOWN_COMPLAINT
 
 
 def kinds_of_changes(changes: Sequence[Change]) -> list[str]:
@@ -189,11 +179,11 @@ def kinds_of_changes(changes: Sequence[Change]) -> list[str]:
     """
     factors = {each.name: each.now / each.before for each in changes if each.before}
     if SPRING not in factors:
-        return [kind_of(each.name) for each in changes]
+        return [complaint_of(each.name) for each in changes]
     if COULOMB in factors and abs(factors[COULOMB] / factors[SPRING] - 1.0) < LIKE:
         return ["air supply or leak"]
-    others = [kind_of(each.name) for each in changes if each.name != SPRING]
-    return ["lost calibration", "spring or diaphragm", *others]
+    others = [complaint_of(each.name) for each in changes if each.name != SPRING]
+    return ["lost calibration", SPRING_OR_DIAPHRAGM, *others]
 
 
 def valve_in(text: str) -> ValveFile:
