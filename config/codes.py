@@ -172,6 +172,11 @@ class ExperimentState(Code):
     TURNED = 15, "complete: it turned at its travel and came back"
     BEYOND_BAND = 16, "the stem went beyond the band of the experiment"
 
+    @property
+    def played(self) -> bool:
+        """Whether it came to its end, and was not broken off."""
+        return self in (ExperimentState.COMPLETE, ExperimentState.TURNED)
+
 
 class ValveTestVerdict(Code):
     """What a test on the valve comes to."""

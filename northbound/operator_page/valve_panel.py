@@ -1,13 +1,14 @@
 """One valve in full. Every word comes from `facts` and what that stands on; here it is only put in its place."""
 
 import time
-from collections.abc import Iterable
+from collections.abc import Callable, Iterable
 
 from nicegui import ui
 
 from config.results.block import as_html
 from northbound.observer.happened import WhatHappened, what_happened
 from northbound.observer.last_moves import LastMoves, last_moves
+from northbound.observer.valve_commands import Confirmation
 from northbound.observer.valve_view import ValvePicture
 from northbound.observer.watched_valves import WatchedValve
 from northbound.operator_page import facts
@@ -72,12 +73,12 @@ class ValvePanel:
                 with ui.element("div").classes("wide column"):
                     self._trend(theme)
                     self._moves(theme)
+                    self._tests = TestCard(valve.place, valve.tests, signed, self._do)
                 with ui.element("div").classes("side column before-plots"):
                     self._controls = Controls(valve, signed, units)
                     self._alarms = AlarmCard(valve.commands, signed, self._controls.do)
                     self._status = FactsCard("Status", "status")
             with ui.element("div").classes("cards"):
-                self._tests = TestCard(valve.place, valve.tests, signed, self._controls.do)
                 self._estimates = FactsCard("Estimates, with 95 % intervals", "estimates")
                 self._wear = FactsCard("Friction and wear", "wear")
                 with self._wear.card:
@@ -109,6 +110,9 @@ class ValvePanel:
         self._controls.show(picture)
         self._alarms.show(picture)
         self._tests.show(picture)
+
+    async def _do(self, command: Callable[..., Confirmation]) -> None:
+        await self._controls.do(command)
 
     def redraw(self) -> None:
         """Draw it in other units."""

@@ -29,7 +29,7 @@ def run(arguments: argparse.Namespace) -> int:
     """Write the report; 1 if nothing is kept."""
     from config.daemon_file import load_daemon
     from config.errors import CommandFailed, InputError
-    from positioner.cli.parts.valve_test import records_folder
+    from positioner.history.kept_tests import records_folder
     from positioner.tests_on_the_valve.as_found_report import ValveReport, as_html, recommended_by, write_pdf
     from positioner.tests_on_the_valve.kept_records import records
 

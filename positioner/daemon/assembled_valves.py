@@ -46,6 +46,7 @@ from positioner.daemon.recorder import Recorder
 from positioner.daemon.refinement_process import RefinementProcess
 from positioner.daemon.service_state import service_state
 from positioner.daemon.supervisory_registers import SupervisoryRegisters
+from positioner.history.kept_tests import last_tested_s, records_folder
 
 log = logging.getLogger(__name__)
 
@@ -264,6 +265,7 @@ def _assembled(
             health, lambda: cycle.snapshot, file.valve.name, stored, partial(_tell_of_health, happened), alarms
         )
     ]
+    health.watch.tested(last_tested_s(records_folder(file, source)))
     if memory is not None:
         keepers.append(_memory_keeper(memory, file.valve.name, controller, cycle))
     return ServedValve(

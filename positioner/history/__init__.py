@@ -5,6 +5,7 @@ One daemon writes; whoever may read the file reads it meanwhile. `docs/history.m
     entries                       what is kept, a table a class
     history_file                  the file: opened or refused, written, bounded by age and size
     history_reader                what is in it, for commands and pages
+    kept_tests                    where the records of tests on a valve are, and when the last was
 """
 
 from positioner.history.history_file import FILE_NAME, HistoryFile, HistoryFull

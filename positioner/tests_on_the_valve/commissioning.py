@@ -29,7 +29,7 @@ from config.travel import ActionWord
 from positioner.response.figure import Figure, undetermined
 from positioner.tests_on_the_valve import signature, small_steps
 from positioner.tests_on_the_valve.outcome import Outcome, Quantity
-from positioner.tests_on_the_valve.program import PLAYED, Bounds, Leap, Played, Player, Program, ramped
+from positioner.tests_on_the_valve.program import Bounds, Leap, Played, Player, Program, ramped
 
 TEST = "commissioning"
 WATCHED_S = 3.0
@@ -194,7 +194,7 @@ def _played(valve: Watching, program: Program, show: Callable[[str], None]) -> R
 
 
 def _recording_of(played: Played) -> Recording:
-    if played.state not in PLAYED or played.recording is None:
+    if not played.state.played or played.recording is None:
         raise _Ended(
             ValveTestVerdict.BROKEN_OFF, f"{played.problem or 'nothing was recorded'}; the command before is held"
         )

@@ -18,7 +18,7 @@ from config.errors import InputError
 from positioner.response.figure import Figure, undetermined
 from positioner.tests_on_the_valve.breakout import HELD_S, Breakout, breakout, rest_before, tolerance_m
 from positioner.tests_on_the_valve.outcome import Curve, Outcome, Picture, Quantity
-from positioner.tests_on_the_valve.program import PLAYED, Bounds, Leap, Played, Program, ramped
+from positioner.tests_on_the_valve.program import Bounds, Leap, Played, Program, ramped
 
 TEST = "continuous stroke test"
 RATE = 5e-4
@@ -89,7 +89,7 @@ def continuous_stroke(
         rests.append(rest.position_m)
         found.append(breakout(each.recording, rest, tolerance))
     for each in played:
-        if each.state not in PLAYED:
+        if not each.state.played:
             beyond = each.state in (ExperimentState.BEYOND_BAND, ExperimentState.OUTSIDE_WINDOW)
             verdicts.append(ValveTestVerdict.TRAVEL_EXCEEDED if beyond else ValveTestVerdict.BROKEN_OFF)
             notes.append(f"broken off: {each.problem}")

@@ -1,7 +1,7 @@
 """Records of tests, kept in the valve's history: as found, as left, as the factory left it; and what has changed since.
 
 A record is one JSON file, `STAMP_TEST.json`, in a folder of the valve's own: outcome, picture, what was configured.
-`[history] folder` of the daemon's file is where those folders are; without it the folder of that file.
+`positioner.history.kept_tests` says where those folders are.
 
 A figure has changed where it is off by more than `CHANGED` of both deviations together, and by `WORTH` of itself:
 
@@ -20,7 +20,6 @@ import numpy as np
 
 from config.drive import ROTARY
 from config.errors import InputError
-from config.file_stem import file_stem
 from config.json_value import json_value
 from config.results.block import Table
 from config.whole_file import replace_whole
@@ -32,7 +31,6 @@ KINDS = ("factory", "as_found", "as_left")
 """What a record is kept as; the newest of a kind stands for it."""
 BASELINES = ("as_left", "factory")
 """What a test is compared with where nobody says, the first that is there."""
-FOLDER = "tests"
 CHANGED = 4.0
 """Deviations: of twenty figures one in a thousand comparisons is off by so much without a change."""
 WORTH = 0.02
@@ -110,11 +108,6 @@ class Record:
         """What it is, in a few words."""
         when = datetime.fromtimestamp(self.time_s, UTC)
         return f"{self.kind.replace('_', ' ') or 'test'} of {when:%Y-%m-%d %H:%M} UTC"
-
-
-def folder_of(history: Path, valve: str) -> Path:
-    """Return where the records of a valve are."""
-    return history / FOLDER / file_stem(valve)
 
 
 def keep(folder: Path, outcome: Outcome, kind: str, time_s: float, configuration: Mapping[str, Any]) -> Path:

@@ -14,7 +14,7 @@ from config.recorder_files import COLUMNS
 from config.recording import Recording, of_kind
 from positioner.daemon.cycle import Cycle
 from positioner.daemon.recorder import Row
-from positioner.tests_on_the_valve.program import PLAYED, Played, Program
+from positioner.tests_on_the_valve.program import Played, Program
 
 
 class Rows:
@@ -86,7 +86,7 @@ class OwnCycle:
             self._break_off()
             raise
         state = cycle.snapshot.decision.experiment.state
-        return Played(self._rows.taken(), state, "" if state in PLAYED else self._why(state))
+        return Played(self._rows.taken(), state, "" if state.played else self._why(state))
 
     def _to_its_end(self) -> None:
         self._turn()

@@ -36,7 +36,7 @@ from positioner.tests_on_the_valve.breakout import (
     tolerance_m,
 )
 from positioner.tests_on_the_valve.outcome import Curve, Outcome, Picture, Quantity
-from positioner.tests_on_the_valve.program import PLAYED, Bounds, Leap, Played, Program, ramped
+from positioner.tests_on_the_valve.program import Bounds, Leap, Played, Program, ramped
 
 TEST = "partial stroke test"
 RAMP_S = 60.0
@@ -147,7 +147,7 @@ def partial_stroke(
     """
     recording = played.recording
     rest = None if recording is None else rest_before(recording)
-    broken_off = [] if played.state in PLAYED else [_abort(played.state)]
+    broken_off = [] if played.state.played else [_abort(played.state)]
     if recording is None or rest is None:
         verdict = broken_off or [ValveTestVerdict.UNDETERMINED]
         why = played.problem or "too few samples of the rest before it"
@@ -234,7 +234,7 @@ def _figures(
     after = rest_after(recording)
     unrested = undetermined("broken off, or too few samples of the rest after it")
     off = unrested
-    if after is not None and state in PLAYED:
+    if after is not None and state.played:
         off = Figure(after.position_m - rest.position_m, hypot(after.error_m, rest.error_m))
     return [
         Quantity("command_pa", "command in force before it", "Pa", Figure(float(command_pa[0]))),

@@ -57,10 +57,6 @@ class Played:
     problem: str = ""
 
 
-PLAYED = (ExperimentState.COMPLETE, ExperimentState.TURNED)
-"""What a program comes to that was not broken off."""
-
-
 class Player(Protocol):
     """Plays programs on a valve, in whatever world it is."""
 

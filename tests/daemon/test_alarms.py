@@ -2,6 +2,7 @@
 
 import json
 from collections.abc import Callable
+from dataclasses import replace
 from itertools import product
 from math import inf, log, nan
 from pathlib import Path
@@ -12,7 +13,7 @@ from pymodbus.constants import ExcCodes
 
 from config.alarm_advice import ADVICE
 from config.alarm_table import CLASSED, AlarmsTable
-from config.codes import AlarmState, EventKind, Mode, Ne107Cause, Ne107Status
+from config.codes import AlarmState, EventKind, ExperimentState, Mode, Ne107Cause, Ne107Status, ValveTestVerdict
 from config.daemon_file import DaemonFile, HealthTable
 from config.errors import InputError
 from config.loading import validated
@@ -26,6 +27,9 @@ from positioner.daemon.health.e_detector import SECONDS_A_YEAR, EDetector, of_a_
 from positioner.daemon.health.packing_tests import HOUR_S, FoundFriction, PackingLimits, PackingTests
 from positioner.daemon.health.position_limits import PositionLimits
 from positioner.daemon.health.valve_health import HealthSettings
+from positioner.history.kept_tests import last_tested_s
+from positioner.tests_on_the_valve.kept_records import keep
+from positioner.tests_on_the_valve.outcome import Outcome
 from tests.daemon.health.test_valve_health import LAW, Panel, in_automatic
 
 NORMAL, NEW, SEEN, RETURNED, SHELVED = AlarmState
@@ -173,6 +177,28 @@ def test_a_model_that_has_changed_and_a_test_that_is_overdue_are_told() -> None:
     health.look(sample, found._replace(applied=type(applied)(softer, 2)), 31 * 86400.0)
     assert health.conditions == {Ne107Cause.MODEL_CHANGED, Ne107Cause.TEST_OVERDUE}
     assert panel.get("alarms_active") == 0.0
+
+
+DAY_S = 86_400.0
+
+
+def test_a_test_is_due_since_the_last_one_played_here_or_kept_by_a_command_of_its_own(tmp_path: Path) -> None:
+    _, sample, decision = in_automatic()
+    health = Health(HealthSettings.of(HealthTable(), 0.1016, alarms=AlarmsTable(test_interval_days=30.0)))
+
+    def overdue(day: float, state: ExperimentState = ExperimentState.NONE) -> bool:
+        played = replace(decision.experiment, state=state)
+        health.look(sample, decision._replace(experiment=played), day * DAY_S)
+        return Ne107Cause.TEST_OVERDUE in health.conditions
+
+    for day, verdict in ((5.0, ValveTestVerdict.FRICTION_HIGH), (20.0, ValveTestVerdict.BROKEN_OFF)):
+        keep(tmp_path, Outcome("step test", "FV-1", (), (verdict,)), "", day * DAY_S, {})
+    (tmp_path / "20990101T000000_torn.json").write_text("{")
+    health.watch.tested(last_tested_s(tmp_path))
+    assert [overdue(day) for day in (34.0, 36.0)] == [False, True], "since day 5: broken off is no test"
+    assert not overdue(36.0, ExperimentState.TURNED), "a partial stroke turns at its travel"
+    assert [overdue(day) for day in (65.0, 67.0)] == [False, True]
+    assert last_tested_s(tmp_path / "nowhere") is None
 
 
 def test_the_dcs_reads_acknowledges_and_shelves(tmp_path: Path) -> None:

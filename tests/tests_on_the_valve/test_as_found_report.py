@@ -10,9 +10,10 @@ import pytest
 
 from config.codes import ValveTestVerdict
 from positioner.cli.main import main
+from positioner.history.kept_tests import folder_of
 from positioner.response.figure import Figure
 from positioner.tests_on_the_valve.as_found_report import ValveReport, as_html, recommended_by
-from positioner.tests_on_the_valve.kept_records import folder_of, keep, records
+from positioner.tests_on_the_valve.kept_records import keep, records
 from positioner.tests_on_the_valve.outcome import Outcome, Quantity
 from positioner.tests_on_the_valve.signature import signature
 from tests.tests_on_the_valve.test_signature import PLATE, TIGHT, recorded

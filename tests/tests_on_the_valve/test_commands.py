@@ -7,7 +7,8 @@ import pytest
 
 from config.slave_file import Initial
 from positioner.cli.main import main
-from positioner.tests_on_the_valve.kept_records import Record, folder_of, records
+from positioner.history.kept_tests import folder_of
+from positioner.tests_on_the_valve.kept_records import Record, records
 from positioner.tests_on_the_valve.program import Played, Program
 from tests.tests_on_the_valve.virtual_valve import (
     AREA_M2,

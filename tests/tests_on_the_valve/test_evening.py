@@ -15,7 +15,8 @@ from config.daemon_file import DaemonFile, load_daemon
 from config.slave_file import Initial
 from config.valve_file import ValveFile
 from positioner.cli.main import main
-from positioner.tests_on_the_valve.kept_records import folder_of, keep
+from positioner.history.kept_tests import folder_of
+from positioner.tests_on_the_valve.kept_records import keep
 from positioner.tests_on_the_valve.signature import Nameplate, signature
 from tests.tests_on_the_valve.test_signature import recorded
 from tests.tests_on_the_valve.virtual_valve import (

@@ -101,13 +101,13 @@ class RunningValve:
     def play(self, program: "Program") -> "PlayedProgram":
         """Play a program and return what the daemon's recorder has of it."""
         from config.codes import ExperimentState
-        from positioner.tests_on_the_valve.program import PLAYED, Played
+        from positioner.tests_on_the_valve.program import Played
 
         within_s = 2.0 * self._file.experiment.limit_s + RECORDED_WITHIN_S
         with _dcs(self._arguments) as dcs:
             turn, band = (each / self._file.valve.stroke_m for each in (program.turn_m, program.band_m))
             state = dcs.play(program.points, within_s, turn=turn, band=band)
-            problem = "" if state in PLAYED else why_not(state, dcs)
+            problem = "" if state.played else why_not(state, dcs)
         points = program.points if state is ExperimentState.COMPLETE else ()
         recording = recorded(self._folder, self._file.valve.name, points)
         if recording is None and not problem:

@@ -107,14 +107,12 @@ def played_all(player: "Player", programs: "tuple[Program, ...]") -> "list[Playe
     """Play programs one after another until one does not come to its end; say what goes on."""
     import sys
 
-    from positioner.tests_on_the_valve.program import PLAYED
-
     played = []
     for number, program in enumerate(programs, start=1):
         of = f"{number} of {len(programs)}"
         print(f"{of}: {program.name}, {program.lasts_s:.0f} s", file=sys.stderr, flush=True)
         played.append(player.play(program))
-        if played[-1].state not in PLAYED:
+        if not played[-1].state.played:
             break
     return played
 
@@ -146,6 +144,7 @@ def reference_of(test: str, file: "DaemonFile", arguments: argparse.Namespace) -
     Raises:
         InputError: one was asked for, and there is none.
     """
+    from positioner.history.kept_tests import records_folder
     from positioner.tests_on_the_valve.kept_records import baseline
 
     return baseline(records_folder(file, arguments.config), test, arguments.against)
@@ -154,6 +153,7 @@ def reference_of(test: str, file: "DaemonFile", arguments: argparse.Namespace) -
 def trend_of(test: str, names: Sequence[str], file: "DaemonFile", arguments: argparse.Namespace) -> str:
     """Return the last tests of this kind as text, a row each."""
     from config.results.block import as_text
+    from positioner.history.kept_tests import records_folder
     from positioner.tests_on_the_valve.kept_records import records, trend
 
     return "\n" + as_text([trend(records(records_folder(file, arguments.config), test), names)])
@@ -220,18 +220,11 @@ def _compared(outcome: "Outcome", before: "Record | None") -> "tuple[Outcome, li
     return replace(outcome, verdicts=(*others, ValveTestVerdict.CHANGED), tables=tables), told
 
 
-def records_folder(file: "DaemonFile", config: Path) -> Path:
-    """Return where the records of a valve are kept."""
-    from positioner.tests_on_the_valve.kept_records import folder_of
-
-    beside = Path(config).parent
-    return folder_of(beside if file.history is None else beside / file.history.folder, file.valve.name)
-
-
 def kept(outcome: "Outcome", file: "DaemonFile", arguments: argparse.Namespace, kind: str) -> Path:
     """Keep an outcome as a kind, with what was configured, and return its file."""
     import time
 
+    from positioner.history.kept_tests import records_folder
     from positioner.tests_on_the_valve.kept_records import keep
 
     return keep(records_folder(file, arguments.config), outcome, kind, time.time(), configured(file))

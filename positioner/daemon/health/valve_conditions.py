@@ -73,6 +73,11 @@ class ValveConditions:
         self._packing.begin(frozenset(Ne107Cause[each] for each in kept.raised))
         return self
 
+    def tested(self, at_s: float | None) -> None:
+        """Take when a test of which a record is kept was, s since 1970: by a command that had the valve to itself."""
+        latest_s = max((each for each in (at_s, self._kept.tested_s) if each is not None), default=None)
+        self._kept = self._kept.model_copy(update={"tested_s": latest_s})
+
     def look(self, sample: Sample, decision: Decision, packing: PackingFigures, wall_s: float) -> frozenset[Ne107Cause]:
         """Return what holds now; `wall_s` is the time of day, s since 1970."""
         raised = self._packing.look(sample.now_s, *packing)
@@ -96,5 +101,5 @@ class ValveConditions:
 
     def _tested_s(self, decision: Decision, wall_s: float) -> float:
         before, self._experiment = self._experiment, decision.experiment.state
-        ended = self._experiment is ExperimentState.COMPLETE and before is not ExperimentState.COMPLETE
+        ended = self._experiment.played and self._experiment is not before
         return wall_s if ended or self._kept.tested_s is None else self._kept.tested_s
