@@ -2,10 +2,10 @@
 
     python -m benchmarks.other_valve_tests [--variants plain 12_bit air_to_close rotary] [--seed 0] [--sticking]
 
-The plant is that of `tests/other_device.py`, 50 ms a cycle in virtual time. 1 % noise of the stroke, or 12 bits and none.
-What is commissioned is unknown but for device and supply. Each line says a figure, what it should be, and how far off it
-is: friction within 3 %, spring 1 %, bench set and seat load 2 %. Its stem breaks loose at what it slides at; with
---sticking at a third more, and its slow ramp shows what lies between the two.
+The plant is that of `tests/other_device.py`, 50 ms a cycle in virtual time, with 1 % noise of the stroke, or 12 bits and
+none. What is commissioned is unknown but for device and supply. Each line says how far figures are off: friction is to be
+within 3 %, spring 1 %, bench set and seat load 2 %. The stem breaks loose at what it slides at; with --sticking at a
+third more, and its slow ramps show what lies between the two.
 """
 
 import argparse
