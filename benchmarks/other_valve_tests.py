@@ -2,8 +2,8 @@
 
     python -m benchmarks.other_valve_tests [--variants plain 12_bit air_to_close rotary] [--seed 0] [--sticking]
 
-The plant is that of `tests/other_device.py`, 50 ms a cycle in virtual time, with 1 % noise of the stroke, or 12 bits and
-none. What is commissioned is unknown but for device and supply. Each line says how far figures are off: friction is to be
+The plant is that of `tests/other_device.py`, 50 ms a cycle in virtual time, with 1 % noise of the stroke, or 12 bits.
+What is commissioned is unknown but for device and supply. Each line says how far figures are off. Friction is to be
 within 3 %, spring 1 %, bench set and seat load 2 %. The stem breaks loose at what it slides at; with --sticking at a
 third more, and its slow ramps show what lies between the two.
 """
