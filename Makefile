@@ -4,7 +4,7 @@ VENV   := .venv
 BIN    := $(VENV)/bin
 READY  := $(VENV)/.ready
 
-.PHONY: venv demo test suite long lint browser bench campaign fuzz kills endurance blind journey locked sbom docs clean
+.PHONY: venv demo test suite long lint browser bench campaign fuzz kills endurance blind journey locked sbom release-check docs clean
 
 venv: $(READY)
 
@@ -76,6 +76,9 @@ sbom: $(READY)          ## what a gateway installs, as CycloneDX: dist/positione
 	mkdir -p dist
 	$(BIN)/cyclonedx-py environment --pyproject pyproject.toml --output-reproducible --of JSON -o dist/positioner.cdx.json \
 	    build/gateway/bin/python
+
+release-check: $(READY) ## minutes: sdist and wheel, tried outside the tree on each Python that is found
+	$(BIN)/python .ci/release_check.py
 
 docs: $(READY)          ## the documents' pictures and figures, made anew
 	$(BIN)/positioner reproduce --out docs/img

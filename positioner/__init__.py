@@ -53,7 +53,7 @@ if TYPE_CHECKING:
     from workbench.fleet.fleet import Fleet, fleet
     from workbench.forces.force_diagnosis import ForceDiagnosis, diagnose_forces
 
-__version__ = "0.1.0"
+__version__ = "1.0.0rc1"
 
 _ROOMS = {
     "config.device": ("Device",),

@@ -13,6 +13,7 @@ replaces that snapshot whole.
 
 import logging
 import math
+import re
 import time
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import replace
@@ -432,8 +433,16 @@ def _operation_getters(health: Health) -> dict[str, Getter]:
     }
 
 
+def version_numbers(text: str) -> tuple[float, float, float]:
+    """Return major, minor and patch of a version; of "1.0.0rc1", which comes before 1.0.0, these."""
+    numbers = re.match(r"(\d+)\.(\d+)\.(\d+)", text)
+    assert numbers is not None
+    major, minor, patch = map(float, numbers.groups())
+    return major, minor, patch
+
+
 def _identity_getters() -> dict[str, Getter]:
-    major, minor, patch = (float(part) for part in version("positioner").split(".")[:3])
+    major, minor, patch = version_numbers(version("positioner"))
     return {
         "map_version": lambda _s, _r: MAP_VERSION,
         "version_major": lambda _s, _r: major,

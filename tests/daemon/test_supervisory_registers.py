@@ -20,7 +20,7 @@ from positioner import dcs
 from positioner.control.requests import Requests
 from positioner.control.travel.signal_path import SignalPath
 from positioner.daemon.cycle import Cycle
-from positioner.daemon.supervisory_registers import SupervisoryRegisters
+from positioner.daemon.supervisory_registers import SupervisoryRegisters, version_numbers
 from positioner.virtual.virtual_cycle import virtual_cycle
 from sim.slave.modbus_slave import device_of
 
@@ -287,3 +287,8 @@ def test_a_dcs_identifies_though_somebody_left_the_switches_on(panel: Panel, mon
     seen: list[float] = []
     client.identify({"alpha": 60e3, "beta": 13e3}, 5.0, seen.append)
     assert seen[-1] == 1.0, "it was excited to the end"
+
+
+@pytest.mark.parametrize("text", ["1.2.3", "1.2.3rc1", "1.2.3.dev4+g12ab"])
+def test_a_version_is_three_numbers_to_a_client_also_before_its_release(text: str) -> None:
+    assert version_numbers(text) == (1.0, 2.0, 3.0)

@@ -72,7 +72,7 @@ def change(path: Path, diff: str) -> None:
 def install(tree: Path) -> None:
     """Leave what `make venv` leaves of the tree's entry points."""
     project = tomllib.loads((tree / "pyproject.toml").read_text(encoding="utf-8"))["project"]
-    metadata = tree / "positioner-0.1.0.dist-info"
+    metadata = tree / "positioner-1.0.0.dist-info"
     metadata.mkdir()
     (metadata / "METADATA").write_text(f"Metadata-Version: 2.1\nName: positioner\nVersion: {version('positioner')}\n")
     groups = project["entry-points"].items()
