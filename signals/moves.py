@@ -91,7 +91,8 @@ def moves(position_m: Array, noise_m: float) -> tuple[Move, ...]:
     runs = [(int(first), int(end)) for first, end in zip(edges[::2], edges[1::2], strict=True)]
     # Steps first .. end - 1 move: samples `first` and `end` are the last and the next at rest.
     apart = _joined(runs, lambda one, other: not _rests_between(x, noise_m, one, other))
-    apart = _joined(apart, lambda one, other: _is_tail(x, noise_m, one, other))
+    shown = [run for run in apart if abs(x[run[1]] - x[run[0]]) > COVERED * noise_m]
+    apart = _joined(shown, lambda one, other: _is_tail(x, noise_m, one, other))
     return tuple(_fitted(x, noise_m, apart))
 
 

@@ -43,7 +43,7 @@ stand in this file or in an effect's own: a kernel is cached under the digest of
 """
 
 # ruff: noqa: ARG001 -- an empty place takes what a full one needs.
-from math import ceil, cos, exp, sin, sqrt
+from math import ceil, cos, exp, nan, sin, sqrt
 from typing import Any, NamedTuple
 
 import numpy as np
@@ -57,6 +57,8 @@ SLIP = 2
 
 TOLERANCE = 1e-5
 """Of one sub-step on the velocity, relative to |v| + v_s, where nothing else is asked for."""
+MOST_SUBSTEPS, MOST_CHANGES = 100_000, 1000
+"""Sub-steps, and changes of mode, of one step, beyond which there is no answer (NaN): no stem is so stiff."""
 SHORTEST_SUBSTEP = 2.0**-20
 """Sub-step, in steps, that is taken whatever its error: a kink of a force is passed there."""
 EXPONENTIAL_ANGLE = 0.15
@@ -324,7 +326,11 @@ def move(
         s = max(FIRST_CHANGE * (abs(v) + valve.v_s) / abs(a), SHORTEST_SUBSTEP * s)
     damping = valve.F_v * valve.per_m
     shortest_exponential = EXPONENTIAL_ANGLE / sqrt(valve.k_s * valve.per_m)
+    tried = 0
     while tau < h:
+        tried += 1
+        if tried > MOST_SUBSTEPS:
+            return h, nan, nan, False
         exponential = mode == SLIP and s > shortest_exponential
         if exponential:
             x1, v1, a1, error = exponential_step(valve, damping, sigma, drive, tau, s, x, v, a, q, z)
@@ -416,8 +422,11 @@ def step(
     z: Any,
 ) -> tuple[float, float, int, float]:
     """Carry the stem over one step; return x, v, mode, sigma at its end. Where it is held it stays once it is stuck."""
-    tau = 0.0
+    tau, changes = 0.0, 0
     while tau < h and not (held and mode == STUCK):
+        changes += 1
+        if changes > MOST_CHANGES:
+            return nan, nan, SLIP, sigma
         if mode == STUCK:
             tau, mode, sigma = wait(valve, drive, tau, h, x, sigma, q, z)
             continue

@@ -57,7 +57,7 @@ SLOW_ENTRIES: Mapping[str, tuple[int, ...]] = {
 
 TOLD_ENTRIES: Mapping[str, tuple[int, ...]] = {
     "rest": EITHER["rest"],
-    "tell": (VECTOR, VECTOR, VECTOR, VECTOR, VECTOR, VECTOR, NUMBER, NUMBER, NUMBER, MATRIX, MATRIX),
+    "tell": (VECTOR, VECTOR, VECTOR, VECTOR, VECTOR, VECTOR, NUMBER, NUMBER, NUMBER, VECTOR, MATRIX),
 }
 
 

@@ -54,6 +54,8 @@ LOOSE_S = 2e-3
 """Longest step of a stem that may slide, s: within a stem's own times it is fast, and has stopped again."""
 FAR_M = 1e9
 """Place of a stem that was let go and has left."""
+SETTLED = 1e-6
+"""Of the blur: what an indication moves by in a period once its sensor has come to rest."""
 HELD_N = 1e-9
 """L of a stem that is held and bears nothing: other than 0, which says that it is not."""
 
@@ -132,7 +134,8 @@ def carried(
             there = seen + seen_rate * (t0 - t) if fed else x
             _, s = straight(command, left, Stem(t0, there, v, p), q, z)
             p0, p = pressure(command, command, s, Stem(t0, there, v, p), q, z)
-            if mode == STUCK or abs(x - place) <= blur:
+            rested = mode == STUCK
+            if rested or abs(x - place) <= blur:
                 most = max(most, load(valve, Stem(t0, x, 0.0, p0), blur, q, z))
             law = free if fast > 0.0 else valve
             x, v, mode, sigma = step(law, Drive(t0, p0, (p - p0) / s), s, x, v, mode, sigma, tolerance, held, q, z)
@@ -146,12 +149,20 @@ def carried(
             t0 += s
             left -= s
             stem = Stem(t0, x, v, p)
-            if mode == STUCK and held:
+            if mode == STUCK and held and not (rested and p == p0):
                 most = max(most, load(valve, stem, blur, q, z))
             remember(x0, s, stem, q, z)
             _, indicated = sensor(x0, x, s, stem, q, z)
     off = unknown(sigma + excess(valve, Stem(t + duration, x, v, p), q, z))
     return Told(Condition(t + duration, x + off, v, p, mode, sigma, indicated + off), most, fast)
+
+
+def alike(i: int, commands: Vector, held: Vector) -> int:
+    """Return the period after the last that goes on as the i-th: the stem held throughout, the command the same."""
+    end = i
+    while end < len(commands) and held[end] >= 1.0 and commands[end] == commands[i]:
+        end += 1
+    return end
 
 
 def tell(
@@ -164,46 +175,55 @@ def tell(
     longest_step: float,
     tolerance: float,
     blur: float,
-    path: Vector,
+    indicated: Vector,
     loads: Vector,
 ) -> None:
-    """Hold each command for its period in turn, the stem for a share of it; write t, p, x, v, indicated as `respond`.
+    """Hold each command for its period in turn, the stem for a share of it; write what is indicated, m, (periods + 1,).
 
     Seen is what a pressure path that obeys the stem is fed, m, (periods + 1,); NaN: the simulated stem.
     Shares, (periods,), from 0, loose throughout, to 1, held throughout. Loads, (2, periods): L, N, of the stem held in
     a period, and where it was let go in it; 0 where it was not.
+
+    A stem that stays held under the same command is carried at once to its end, if what it shows has come to rest: L is
+    convex between, and greatest at one of the ends.
     """
     valve, now, fast = told_valve(theta), read(state), 0.0
     place = FAR_M
-    for i in range(len(commands) + 1):
-        if i > 0:
-            k, share = i - 1, held[i - 1]
-            loads[0, k], loads[1, k] = 0.0, 0.0
-            command, rests_s, slides_s = commands[k], share * periods[k], (1.0 - share) * periods[k]
-            rate = (seen[i] - seen[k]) / periods[k]
-            fed = seen[k]
-            if rests_s > 0.0:
-                here = carried(
-                    *(valve, now, command, rests_s, longest_step, tolerance, True, fast, fed, rate, blur, FAR_M),
-                    *(theta, state),
-                )
-                now, loads[0, k], fast = here.now, max(here.load, HELD_N), here.fast
-                place = now.x if now.mode == STUCK else FAR_M
-            if slides_s > 0.0:
-                still = abs(now.x - place) <= blur
-                fed += rate * rests_s
-                here = carried(
-                    *(valve, now, command, slides_s, longest_step, tolerance, False, fast, fed, rate, blur, place),
-                    *(theta, state),
-                )
-                now, fast = here.now, here.fast
-                if still:
-                    loads[1, k] = max(here.load, loads[0, k], HELD_N)
-                if abs(now.x - place) > blur:
-                    place = FAR_M
-        path[0, i] = now.t
-        path[1, i] = now.p
-        path[2, i] = now.x
-        path[3, i] = now.v
-        path[4, i] = now.indicated
+    indicated[0] = now.indicated
+    k, n = 0, len(commands)
+    while k < n:
+        share = held[k]
+        loads[0, k], loads[1, k] = 0.0, 0.0
+        command, rests_s, slides_s = commands[k], share * periods[k], (1.0 - share) * periods[k]
+        rate = (seen[k + 1] - seen[k]) / periods[k]
+        fed = seen[k]
+        end = k + 1
+        if rests_s > 0.0:
+            if now.mode == STUCK and k > 0 and not seen[k] == seen[k]:  # noqa: SIM201 -- NaN is unlike itself
+                if abs(indicated[k] - indicated[k - 1]) <= SETTLED * blur:
+                    end = max(alike(k, commands, held), end)
+                for j in range(k + 1, end):
+                    rests_s += periods[j]
+            here = carried(
+                *(valve, now, command, rests_s, longest_step, tolerance, True, fast, fed, rate, blur, FAR_M),
+                *(theta, state),
+            )
+            now, fast = here.now, here.fast
+            for j in range(k, end):
+                loads[0, j], loads[1, j], indicated[j + 1] = max(here.load, HELD_N), 0.0, now.indicated
+            place = now.x if now.mode == STUCK else FAR_M
+        if slides_s > 0.0:
+            still = abs(now.x - place) <= blur
+            fed += rate * rests_s
+            here = carried(
+                *(valve, now, command, slides_s, longest_step, tolerance, False, fast, fed, rate, blur, place),
+                *(theta, state),
+            )
+            now, fast = here.now, here.fast
+            if still:
+                loads[1, k] = max(here.load, loads[0, k], HELD_N)
+            if abs(now.x - place) > blur:
+                place = FAR_M
+        k = end
+        indicated[k] = now.indicated
     write(state, now)

@@ -71,3 +71,13 @@ def test_a_sample_without_a_number_moves_nothing() -> None:
     x_m = NOISE_M * np.random.default_rng(4).standard_normal(500)
     x_m[[0, 100, 101, 102, 499]] = np.nan
     assert not moves(x_m, NOISE_M)
+
+
+def test_noise_in_a_rest_is_not_the_end_of_the_slide_before_it() -> None:
+    """Of windows beyond 5 deviations one record in twenty has one: a bump of 1.5 noises over 32 samples is such."""
+    x_m = np.concatenate([np.zeros(200), np.linspace(0.0, 900.0, 300), np.full(900, 900.0)]) * NOISE_M
+    x_m += NOISE_M * np.random.default_rng(3).standard_normal(x_m.size)
+    x_m[900:] += 1.5 * NOISE_M
+    assert moving(x_m, NOISE_M)[880:920].any(), "the bump is seen"
+    (move,) = moves(x_m, NOISE_M)
+    assert abs(move.after - 500) <= 3

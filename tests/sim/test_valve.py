@@ -42,6 +42,21 @@ def test_a_run_is_the_same_however_it_is_cut_into_calls(monkeypatch: pytest.Monk
         np.testing.assert_array_equal(getattr(cut, name), getattr(whole, name))
 
 
+def test_a_stem_too_stiff_to_be_followed_has_no_answer(monkeypatch: pytest.MonkeyPatch) -> None:
+    """A drag of 8e7 N (m/s)^-0.5: its damping is infinite where the stem begins to move."""
+
+    def drag(F: float, stem: karnopp.Stem, _q: object, _z: object) -> float:
+        return F - 8e7 * math.copysign(math.sqrt(abs(stem.v)), stem.v)
+
+    monkeypatch.setattr(karnopp, "force", drag)
+    monkeypatch.setattr(karnopp, "MOST_CHANGES", 20)
+    monkeypatch.setattr(karnopp, "MOST_SUBSTEPS", 200)
+    valve = karnopp.karnopp(Composition.from_file(SEED).theta)
+    x, v, _, _ = karnopp.step(valve, karnopp.Drive(0.0, 60e3, 0.0), 0.01, 0.02, 0.0, 0, 0.0, 1e-5, False, None, None)
+    assert math.isnan(x)
+    assert math.isnan(v)
+
+
 def test_rows_are_the_start_and_the_ends_of_the_periods() -> None:
     valve = Valve.from_file(SEED)
     valve.rest_at(0.02, 25e3)

@@ -11,7 +11,7 @@ import numpy as np
 from config.valve_file import EffectTable, ValveFile
 from sim.effect import shipped_effect, shipped_effects
 from tests.workbench.valves import SEED
-from workbench.fit.fit_result import Fit, Term, Terms
+from workbench.fit.fit_result import NOTHING, Fit, Term, Terms
 from workbench.fit.fitted_parameter import Fitted
 from workbench.select.block_errors import BlockErrors
 from workbench.select.effect_candidates import EvaluatedModel
@@ -69,6 +69,7 @@ def fit_of(
         from_pressure=False,
         onsets_s=np.zeros(0),
         load_n=1.0,
+        known=NOTHING,
     )
 
 

@@ -159,6 +159,21 @@ def test_what_was_fitted_is_no_evidence_of_what_was_held_out() -> None:
     assert errors.held_out.landings.independent <= len(told)
 
 
+@pytest.mark.parametrize(("deviations", "holds"), [(0.0, True), (1.0, True), (40.0, False)])
+def test_what_was_held_out_may_have_the_valve_where_its_fit_leaves_it_open_and_no_farther(
+    deviations: float, holds: bool
+) -> None:
+    parts = split([record_of(SEED, 2)])
+    fit = base_fit(problem(parts.train.record, SEED.valve), SEED)
+    spring = fit.parameters["spring_n_per_m"]
+    moved = spring.value + deviations * spring.std
+    off = replace(
+        fit, valve=SEED.model_copy(update={"valve": fit.valve.valve.model_copy(update={"spring_n_per_m": moved})})
+    )
+    errors = block_errors(off, parts)
+    assert (errors.test_rmse_m < 1.2 * parts.scale_m) == holds
+
+
 def test_noise_has_no_structure() -> None:
     record = ready(moving())
     assert max(structure(record, noise(3000, seed)) for seed in range(10)) < STRUCTURED

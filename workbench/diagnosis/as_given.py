@@ -15,9 +15,9 @@ from config.results.result import Brief
 from config.valve_file import ValveFile
 from workbench.compare.comparison import ADEQUATE
 from workbench.data.held_out import Split, residual_m
-from workbench.fit.fit_result import Fit
+from workbench.fit.fit_result import NOTHING, Fit
 from workbench.select.block_errors import BlockErrors, block_errors
-from workbench.select.effect_acceptance import LEAST_HELD_OUT
+from workbench.select.effect_acceptance import LEAST_BIC
 
 
 @dataclass(frozen=True, slots=True, repr=False)
@@ -30,14 +30,14 @@ class AsGiven(Brief):
     @classmethod
     def of(cls, valve: ValveFile, split: Split, like: Fit) -> Self:
         """Simulate a valve file as a fit was."""
-        given = replace(like, valve=valve, parameters={})
+        given = replace(like, valve=valve, parameters={}, known=NOTHING)
         error_m = residual_m(split.train, given.indicated_m(split.train.record))
         given = replace(given, rms_m=float(np.sqrt(np.nanmean(error_m**2))))
         return cls(block_errors(given, split), split.floor_m)
 
     def holds(self, best: BlockErrors) -> bool:
         """Whether the recording does not tell the file from the model that was found, whose errors these are."""
-        return 2.0 * best.held_out.nats_above(self.errors.held_out) <= LEAST_HELD_OUT
+        return 2.0 * best.held_out.nats_above(self.errors.held_out) <= LEAST_BIC
 
     def is_off(self, best: BlockErrors) -> bool:
         """Whether it leaves what `compare` would not call adequate, and the model that was found does better."""

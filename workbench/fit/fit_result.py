@@ -11,7 +11,7 @@ from config.arguments import kinds_held
 from config.drive import Kind
 from config.recording import Column, Recording
 from config.results.block import Block
-from config.results.result import Result
+from config.results.result import Brief, Result
 from config.valve_file import ValveFile
 from signals.independence import independent_share
 from sim.composition import STATIC, Composition
@@ -26,6 +26,7 @@ from workbench.fit.minimiser import End
 from workbench.fit.problem import Problem
 from workbench.fit.uncertainty import Combination, Uncertainty, uncertainty
 from workbench.model.free_run import FreeRun
+from workbench.model.parameters import Parameter
 from workbench.model.sampling import DYNAMIC, Sampling
 
 if TYPE_CHECKING:
@@ -46,14 +47,19 @@ class Term(NamedTuple):
     mean_square: float
 
 
-@dataclass(frozen=True, slots=True)
-class Terms:
+NO_TERM = Term(0.0, 1.0)
+
+
+@dataclass(frozen=True, slots=True, repr=False)
+class Terms(Brief):
     """The likelihood of a fit, kind by kind (`workbench.fit.likelihood`)."""
 
     motion: Term
     landings: Term
     rests: Term
     break_aways: Term
+    moved: Term = NO_TERM
+    """How far the parameters had to go from where another record has them, in deviations."""
 
     def nats_above(self, other: "Terms") -> float:
         """Return the log-likelihood of these less that of another fit's, each kind at the scale that it leaves."""
@@ -62,13 +68,26 @@ class Terms:
 
     @property
     def each(self) -> tuple[Term, ...]:
-        """All four."""
-        return self.motion, self.landings, self.rests, self.break_aways
+        """All of them."""
+        return self.motion, self.landings, self.rests, self.break_aways, self.moved
 
     @property
     def events(self) -> float:
         """Landings and break-aways: the independent things that the parameters of a valve follow from."""
         return self.landings.independent + self.break_aways.independent
+
+
+@dataclass(frozen=True, slots=True, repr=False)
+class Known(Brief):
+    """Free parameters, and R: R times what their coordinates are off is as unlikely as so many deviations."""
+
+    parameters: tuple[Parameter, ...]
+    root: Vector
+    """(parameters, parameters)."""
+
+
+NOTHING = Known((), np.zeros((0, 0)))
+"""Of a valve that was not fitted: nothing of it is free."""
 
 
 @dataclass(frozen=True, slots=True, repr=False)
@@ -97,6 +116,8 @@ class Fit(Result):
     """When each move begins, s."""
     load_n: float = field(repr=False)
     """To which a break-away tells static friction, N."""
+    known: Known = field(repr=False)
+    """What the record says of the coordinates of its parameters."""
     by: Sampling = DYNAMIC
     """How the recording was simulated."""
 
@@ -182,6 +203,7 @@ def fit_at(problem: Problem, like: Likelihood, end: End, agreement: int) -> Fit:
         from_pressure=problem.from_pressure,
         onsets_s=end.onsets_s,
         load_n=problem.load_n,
+        known=Known(like.parameters, determined.root),
         by=problem.by,
     )
 
@@ -209,8 +231,8 @@ def _as_runs_freely(like: Likelihood, end: End, determined: Uncertainty) -> End:
     return replace(end, z=best, groups=groups, cost=like.cost(groups.whole))
 
 
-def terms(like: Likelihood, groups: Groups) -> Terms:
-    """Return what the residuals say, kind by kind.
+def terms(like: Likelihood, groups: Groups, moved: Vector | None = None) -> Terms:
+    """Return what the residuals say, kind by kind; and how far the parameters had moved for them, in deviations.
 
     Samples in motion, and blocks at rest, that hang together count for fewer; landings and break-aways are as many as
     they are.
@@ -221,6 +243,7 @@ def terms(like: Likelihood, groups: Groups) -> Terms:
         _term(groups.landings, scale, 1.0),
         _term(groups.rests, scale, independent_share(groups.rests)),
         _term(groups.break_aways, scale, 1.0),
+        _term(np.empty(0) if moved is None else moved, scale, 1.0),
     )
 
 

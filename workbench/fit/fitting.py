@@ -22,7 +22,7 @@ from workbench.fit.likelihood import Likelihood
 from workbench.fit.minimiser import End, begun, derivatives, ended
 from workbench.fit.onsets import with_onsets
 from workbench.fit.problem import Problem, problem
-from workbench.fit.starts import Origin, base_starts, effect_starts, near_starts, swinging_starts, with_strengths
+from workbench.fit.starts import Origin, base_starts, landed_start, near_start, swinging_starts, with_strengths
 from workbench.fit.threads import linear_algebra_alone, on_threads
 from workbench.model.parameters import DEFAULT, Parameter
 from workbench.model.sampling import DYNAMIC, MOST_WITH_INERTIA, Motion, Sampling
@@ -114,10 +114,10 @@ def _base_fit(
     like = of.likelihood(composition, free)
     first, *others = starts(like)
     ends = [_settled(like, _from_afar(like, first))]
-    if not _at_the_noise(like, ends[0]):
+    if not at_the_noise(like, ends[0].cost):
         ends += on_threads(lambda z: _settled(like, _from_afar(like, z)), others, workers)
     best = min(ends, key=lambda each: each.cost)
-    return _best(of, like, ends), not _at_the_noise(like, best)
+    return _best(of, like, ends), not at_the_noise(like, best.cost)
 
 
 @linear_algebra_alone()
@@ -189,13 +189,14 @@ def begun_trial(
     sheet = composition.theta.copy()
     for i, name in enumerate(BASE):
         sheet[i] = getattr(valve.valve, name)
-    searches: list[Callable[[], End]] = [
-        lambda z=z: ended(like, z, base.onsets_s, coarsely=True)  # type: ignore[misc]
-        for z in near_starts(like, added, fitted, points)
-    ]
+    off = like.coordinates(fitted.theta)
+    searches: list[Callable[[], End]] = [lambda: ended(like, off, base.onsets_s, coarsely=True)]
     if base.cost > AT_THE_NOISE * 0.5 * base.count:
-        begins = effect_starts(like, added, [fitted, Origin(sheet)], points)
-        searches += [lambda z=z: _from_afar(like, z, added, points, coarsely=True) for z in begins]  # type: ignore[misc]
+        afar = landed_start(like, added, [fitted, Origin(sheet)], points)
+        searches.append(lambda: _from_afar(like, afar, added, points, coarsely=True))
+    else:
+        near = near_start(like, added, fitted, points)
+        searches.append(lambda: ended(like, near, base.onsets_s, coarsely=True))
     ends = on_threads(lambda search: search(), searches, workers)
     return Trial(like, tuple(sorted(ends, key=lambda each: each.cost)))
 
@@ -205,7 +206,7 @@ def finished(of: Problem, trial: Trial) -> Fit:
     """Search to the end from the best valley of a trial, and from the next best if that leaves something."""
     like, (first, *others) = trial.like, trial.valleys
     ends = [_settled(like, ended(like, first.z, first.onsets_s))]
-    if not _at_the_noise(like, ends[0]) and others and others[0].cost < NEAR * first.cost:
+    if not at_the_noise(like, ends[0].cost) and others and others[0].cost < NEAR * first.cost:
         ends.append(_settled(like, ended(like, others[0].z, others[0].onsets_s)))
     return _best(of, like, ends)
 
@@ -285,11 +286,12 @@ def _settled(like: Likelihood, end: End) -> End:
     return there if there.cost < end.cost else end
 
 
-def _at_the_noise(like: Likelihood, end: End) -> bool:
-    return end.cost <= AT_THE_NOISE * 0.5 * like.count
+def at_the_noise(like: Likelihood, cost: float) -> bool:
+    """Whether a cost leaves nothing that another start might find."""
+    return cost <= AT_THE_NOISE * 0.5 * like.count
 
 
 def _best(of: Problem, like: Likelihood, ends: Sequence[End]) -> Fit:
     best = min(ends, key=lambda each: each.cost)
     same = sum(each.cost <= SAME_COST * best.cost + NATS for each in ends)
-    return fit_at(of, like, best, same + 1 if _at_the_noise(like, best) else same)
+    return fit_at(of, like, best, same + 1 if at_the_noise(like, best.cost) else same)

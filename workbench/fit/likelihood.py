@@ -40,8 +40,8 @@ class Weights:
 
     block: int = 20
     """Samples of a block of a rest: at 200 Hz a lag of the sensor shows in blocks of a tenth of a second."""
-    landing: float = 0.1
-    """tau, in sigma: no simulation is believed more closely, however long a rest is averaged."""
+    landing: float = 0.2
+    """tau, in sigma: two integrations of one law end a slide that far apart, however long its rest is averaged."""
     break_away: float = 0.01
     """Of F_c on the data sheet, to which a break-away tells F_s: an onset is known to a part of a sample."""
     soft: float = 5.0
@@ -156,6 +156,7 @@ class Likelihood:
         self.layout = layout(record, told, weights)
         self.sigma_m = record.scale_m
         self.landing_m = self.sigma_m * np.sqrt(1.0 / self.layout.per_rest + weights.landing**2)
+        self._last: tuple[bytes, Groups] | None = None
         self.broken = np.array([k for k, each in enumerate(told) if not each.begins_in_motion], dtype=np.int64)
 
     @property
@@ -181,8 +182,11 @@ class Likelihood:
         return np.array([each.coordinate(theta) for each in self.parameters])
 
     def at(self, theta: Vector, onsets_s: Vector) -> Groups:
-        """Simulate; return the residuals."""
-        return self.of_path(self.run.run(theta, onsets_s), theta)
+        """Simulate; return the residuals. Those asked for last are kept: a minimiser asks again for derivatives."""
+        asked = theta.tobytes() + onsets_s.tobytes()
+        if self._last is None or self._last[0] != asked:
+            self._last = asked, self.of_path(self.run.run(theta, onsets_s), theta)
+        return self._last[1]
 
     def of_path(self, path: ToldPath, theta: Vector) -> Groups:
         """Return the residuals of a path."""

@@ -9,7 +9,7 @@ from sim.composition import BASE, SPRING, Composition
 from sim.effect import Effect
 from workbench.data.record import Record, require_units
 from workbench.fit.likelihood import WEIGHTS, Likelihood
-from workbench.model.parameters import AT_REST, BEHIND_POSITIONER, DEFAULT, LANDED, free_parameters
+from workbench.model.parameters import AT_REST, BEHIND_POSITIONER, DEFAULT, LANDED, Parameter, free_parameters
 from workbench.model.sampling import NO_LANDING, Motion, Sampling, sampling
 from workbench.model.told_run import ToldMove, told_moves
 
@@ -57,6 +57,10 @@ class Problem:
         """
         names = self._free(composition) if free is None else free
         parameters = free_parameters(composition, names, scale, known)
+        return self.likelihood_of(composition, parameters)
+
+    def likelihood_of(self, composition: Composition, parameters: Sequence[Parameter]) -> Likelihood:
+        """Return the likelihood of a valve over these parameters."""
         return Likelihood(
             composition,
             self.record,

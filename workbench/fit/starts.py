@@ -20,8 +20,6 @@ OTHER_FRICTION = (0.5, 2.0)
 """Of the data sheet's, where its own leads to no end at the noise: what an engineer may be off by."""
 LESS_DAMPING = (0.7, 0.5, 0.35, 0.25)
 """The same of damping, where a stem may swing past its balance."""
-TRIED = 2
-"""Of the places that landings like best, how many are searched from: the valleys of a time constant are two."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -48,12 +46,12 @@ def _times(like: Likelihood, factor: float, *rows: int) -> Vector:
     return like.coordinates(theta)
 
 
-def near_starts(
+def near_start(
     like: Likelihood, added: Sequence[Parameter], fitted: Origin, points: Sequence[tuple[float, ...]] = ()
-) -> list[Vector]:
-    """Return coordinates beside a fit: with the effects switched off, and with the strengths that suit the fit best."""
+) -> Vector:
+    """Return coordinates beside a fit, with the strengths of the effects that suit it best."""
     onsets_s = like.run.first_onsets_s() if fitted.onsets_s is None else fitted.onsets_s
-    return [like.coordinates(fitted.theta), _likeliest(like, _strewn(like, added, fitted, points), onsets_s)]
+    return _likeliest(like, _strewn(like, added, fitted, points), onsets_s)
 
 
 def with_strengths(
@@ -80,9 +78,9 @@ def _at_its_static(like: Likelihood, theta: Vector, onsets_s: Vector) -> tuple[V
     return there, like.of_path(path, there)
 
 
-def effect_starts(
+def landed_start(
     like: Likelihood, added: Sequence[Parameter], origins: Sequence[Origin], points: Sequence[tuple[float, ...]] = ()
-) -> list[Vector]:
+) -> Vector:
     """Return the coordinates that landings like best, of all strengths beside each origin.
 
     Args:
@@ -91,16 +89,16 @@ def effect_starts(
         origins: valves without them.
         points: values of the parameters in place of those that the effects declare.
     """
-    ranked: list[tuple[float, int, Vector]] = []
+    best, least = like.coordinates(origins[0].theta), np.inf
     for origin in origins:
         onsets_s = like.run.first_onsets_s() if origin.onsets_s is None else origin.onsets_s
         for theta in _strewn(like, added, origin, points):
             found = like.at(theta, onsets_s)
             landed = found.landings * like.landing_m / (SEARCH.begin * like.sigma_m)
             cost = like.cost(np.concatenate([landed, found.break_aways]))
-            ranked.append((cost, len(ranked), like.coordinates(theta)))
-    ranked.sort(key=lambda each: each[:2])
-    return [z for _, _, z in ranked[:TRIED]]
+            if cost < least:
+                best, least = like.coordinates(theta), cost
+    return best
 
 
 def _strewn(

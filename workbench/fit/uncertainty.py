@@ -70,6 +70,8 @@ class Uncertainty:
     upper: Vector
     condition: float
     undetermined: tuple[Combination, ...]
+    root: Vector
+    """(parameters, parameters): what times a step of the coordinates is as unlikely as so many deviations."""
 
 
 def uncertainty(like: Likelihood, end: End) -> Uncertainty:
@@ -104,7 +106,17 @@ def uncertainty(like: Likelihood, end: End) -> Uncertainty:
             std[i] = max(std[i] if std[i] < FARTHEST else 0.0, 0.25 * (high - low))
     least = values[known].min() if known.any() else 0.0
     condition = float(np.sqrt(values[-1] / least)) if least > 0.0 else float("inf")
-    return Uncertainty(std, lower, upper, condition, _open_combinations(like, H[:count, :count], scale[:count]))
+    open_ones = _open_combinations(like, H[:count, :count], scale[:count])
+    return Uncertainty(std, lower, upper, condition, open_ones, _root(inverse[:count, :count], std))
+
+
+def _root(covariance: Vector, std: Vector) -> Vector:
+    """Return R, R'R the information on coordinates that hang together as in a covariance, with these deviations."""
+    own = np.sqrt(np.diag(covariance))
+    hangs = covariance / np.outer(np.where(own > 0.0, own, 1.0), np.where(own > 0.0, own, 1.0))
+    np.fill_diagonal(hangs, 1.0)
+    values, vectors = np.linalg.eigh(hangs)
+    return np.asarray((vectors / np.sqrt(np.maximum(values, NOTHING))).T / np.maximum(std, NOTHING))
 
 
 def _clusters(like: Likelihood) -> list[Rows]:

@@ -18,7 +18,6 @@ from config.results.result import Brief
 from signals.moves import Move, moves
 from sim.composition import Composition
 from sim.karnopp import Vector
-from sim.open_loop import INDICATED, PATH_ROWS
 from workbench.data.record import Record
 from workbench.model.free_run import FreeRun, Segment
 from workbench.model.sampling import DYNAMIC, Sampling
@@ -136,12 +135,12 @@ class ToldRun:
             drive_pa, state = self.free._started(vector, segment)
             held = self._held(part, onsets_s)
             seen_m = self._fed[segment.first]
-            path, loads = np.empty((PATH_ROWS, segment.periods_s.size + 1)), np.empty((2, segment.periods_s.size))
+            shown_m, loads = np.empty(segment.periods_s.size + 1), np.empty((2, segment.periods_s.size))
             self._tell(
                 *(vector, state, drive_pa, segment.periods_s, held, seen_m),
-                *(segment.step_s, self.free._tolerance, self.record.scale_m, path, loads),
+                *(segment.step_s, self.free._tolerance, self.record.scale_m, shown_m, loads),
             )
-            indicated_m[segment.first : segment.end] = path[INDICATED, :: segment.parts]
+            indicated_m[segment.first : segment.end] = shown_m[:: segment.parts]
             if part.rested.size:
                 # What is held bears, what is let go breaks loose: between two rests' begins either is one move's.
                 loads[0, held < 1.0] = 0.0

@@ -7,11 +7,14 @@
     d_k = l_k(base) - l_k(candidate)             held within +-log 2
     reduction = 1 - exp(-mean d_k),              its standard error from the spread of d_k
 
-Of what is held out the valve stays as it was fitted, and only the onsets of its moves are found: whether a model is
-wrong, and what a record leaves open of static friction, are two questions. Errors in metres are of the same runs.
+Of what is held out a valve that fits at the noise stays within what its fit leaves open: the least of the cost and of
+the squares of how far its coordinates go, in deviations. Whether a model is wrong, and what a record leaves open of its
+parameters, are two questions. One that does not fit is wrong, so that its deviations say nothing: it stays as it was
+fitted. Errors in metres are of the same runs.
 """
 
 from dataclasses import dataclass
+from typing import NamedTuple
 
 import numpy as np
 
@@ -22,8 +25,9 @@ from sim.composition import Composition
 from sim.karnopp import Vector
 from workbench.data.held_out import HELD_OUT_RECORDING, Part, Split, residual_m
 from workbench.fit.fit_result import Fit, Terms, terms
-from workbench.fit.fitting import problem_of
+from workbench.fit.fitting import AT_THE_NOISE, at_the_noise, problem_of
 from workbench.fit.likelihood import Groups, Likelihood
+from workbench.fit.minimiser import ended
 from workbench.fit.onsets import motion_rows, with_onsets
 from workbench.model.sampling import NO_LANDING
 from workbench.select.residual_structure import structure
@@ -45,6 +49,8 @@ LEAST_STANDARD_ERROR = 0.01
 """Of a mean logarithm: no better known, however equal the events."""
 NEGLIGIBLE = 0.1
 """Of the floor: what an error below it is does not matter."""
+MOST_MOVED = 4.0
+"""Deviations of a coordinate that a fit leaves open: farther is one in 16 000, and contradicts it."""
 SAME_STANDARD_ERRORS, SAME_REDUCTION = 2.0, 0.02
 """Within one of these two models are indistinguishable."""
 BLOCK_S, BLOCK_SAMPLES = 1.0, 10
@@ -103,30 +109,64 @@ def block_errors(fit: Fit, split: Split) -> BlockErrors:
         InputError: nothing that was held out is judged: no slide is seen to land in it.
     """
     train, test = split.train, split.test
-    fitted, fitted_m = _told(fit, train, fit.onsets_s)
-    held_out, held_out_m = _told(fit, test, None)
-    if not np.isfinite(held_out_m).any():
+    fitted, held_out = _fitted(fit, train), _held_out(fit, test)
+    if not np.isfinite(held_out.error_m).any():
         raise InputError(HELD_OUT_RECORDING, NO_LANDING)
     negligible_m = NEGLIGIBLE * split.scale_m
     return BlockErrors(
-        train_rmse_m=_rms(fitted_m),
-        test_rmse_m=_rms(held_out_m),
-        train_block_m=float(np.median(_event_errors_m(fitted[0], fitted_m, train))),
-        test_block_m=float(np.median(_event_errors_m(held_out[0], held_out_m, test))),
-        logs=_logs(*held_out, test),
-        structure=max(structure(each.record, e, negligible_m) for each, e in ((train, fitted_m), (test, held_out_m))),
-        held_out=terms(held_out[0], _of_counted(*held_out, test)),
+        train_rmse_m=_rms(fitted.error_m),
+        test_rmse_m=_rms(held_out.error_m),
+        train_block_m=float(np.median(_event_errors_m(fitted.like, fitted.error_m, train))),
+        test_block_m=float(np.median(_event_errors_m(held_out.like, held_out.error_m, test))),
+        logs=_logs(held_out.like, held_out.groups, test),
+        structure=max(
+            structure(part.record, told.error_m, negligible_m) for part, told in ((train, fitted), (test, held_out))
+        ),
+        held_out=terms(held_out.like, _of_counted(held_out.like, held_out.groups, test), held_out.moved),
     )
 
 
-def _told(fit: Fit, part: Part, onsets_s: Vector | None) -> tuple[tuple[Likelihood, Groups], Column]:
-    """Return a fit's likelihood and residuals on a part, and what it is off by, m, (n,)."""
+class _Told(NamedTuple):
+    """A fit told through a part."""
+
+    like: Likelihood
+    groups: Groups
+    error_m: Column
+    """(n,)."""
+    moved: Vector
+    """How far its parameters had to go, in deviations, (parameters,)."""
+
+
+def _fitted(fit: Fit, part: Part) -> _Told:
+    """Return a fit told through what it was fitted to."""
+    like, theta = _likelihood(fit, part)
+    onsets_s = fit.onsets_s if fit.onsets_s.size == len(like.moves) else with_onsets(like, theta)[0]
+    return _at(like, part, theta, onsets_s, np.empty(0))
+
+
+def _held_out(fit: Fit, part: Part) -> _Told:
+    """Return a fit told through what was held out, its parameters as what was fitted leaves them open."""
+    like, theta = _likelihood(fit, part)
+    onsets_s, groups = with_onsets(like, theta)
+    z, root = like.coordinates(theta), fit.known.root
+    fits = fit.cost <= AT_THE_NOISE * 0.5 * fit.count
+    if not (fits and z.size) or at_the_noise(like, like.cost(groups.whole)):
+        return _at(like, part, theta, onsets_s, np.zeros(z.size))
+    end = ended(like, z, onsets_s, held=(z, root))
+    moved = root @ (end.z - z)
+    if np.abs(moved).max() > MOST_MOVED:
+        return _at(like, part, theta, onsets_s, np.zeros(z.size))
+    return _at(like, part, like.theta(end.z), end.onsets_s, moved)
+
+
+def _likelihood(fit: Fit, part: Part) -> tuple[Likelihood, Vector]:
     composition = Composition.from_file(fit.valve)
-    like = problem_of(fit, part.record).likelihood(composition, tuple(fit.parameters))
-    if onsets_s is None or onsets_s.size != len(like.moves):
-        onsets_s, _ = with_onsets(like, composition.theta)
-    path = like.run.run(composition.theta, onsets_s)
-    return (like, like.of_path(path, composition.theta)), residual_m(part, path.indicated_m)
+    return problem_of(fit, part.record).likelihood_of(composition, fit.known.parameters), composition.theta
+
+
+def _at(like: Likelihood, part: Part, theta: Vector, onsets_s: Vector, moved: Vector) -> _Told:
+    path = like.run.run(theta, onsets_s)
+    return _Told(like, like.of_path(path, theta), residual_m(part, path.indicated_m), moved)
 
 
 def _counted(like: Likelihood, part: Part) -> list[bool]:
@@ -152,13 +192,14 @@ def _of_counted(like: Likelihood, groups: Groups, part: Part) -> Groups:
 
 def event_logs(fit: Fit, part: Part) -> Column:
     """Return l_k of a fit's events and break-aways in a part, (events,)."""
-    return _logs(*_told(fit, part, None)[0], part)
+    told = _held_out(fit, part)
+    return _logs(told.like, told.groups, part)
 
 
 def event_errors_m(fit: Fit, part: Part) -> Column:
     """Return the rms error of each event of a part that counts, m; of a part without any, of all of it."""
-    (like, _), error_m = _told(fit, part, None)
-    return _event_errors_m(like, error_m, part)
+    told = _held_out(fit, part)
+    return _event_errors_m(told.like, told.error_m, part)
 
 
 def _logs(like: Likelihood, groups: Groups, part: Part) -> Column:
