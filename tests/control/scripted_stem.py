@@ -68,6 +68,10 @@ class ScriptedStem:
         ratios = Ratios(-SLOPE_PA_PER_M, -0.5 * (up_pa + down_pa), 0.5 * (up_pa - down_pa))
         return Balance(ratios, tuple(self.landings[:20]), tuple(self.held[:20]), STROKE_M, now_s=self.now_s)
 
+    def scattered_m(self) -> float:
+        """Return how far a slide lands off its balance, m."""
+        return float(self.rng.normal(0.0, self.scatter_m))
+
     def answer(self) -> SlideOutcome | None:
         """Let the stem answer the command in force; return what it did, None where it has answered that."""
         command_pa, answered_pa, before_m = self.commands_pa[-1], self.answered_pa, self.position_m
@@ -78,8 +82,7 @@ class ScriptedStem:
             lands_m = (command_pa - s * friction_pa) / SLOPE_PA_PER_M
             needs_m = self.onward_m if s == self.direction else self.turning_m
             if not self.stuck and s * (lands_m - self.stuck_m) >= needs_m:
-                off_m = float(self.rng.normal(0.0, self.scatter_m))
-                self.position_m = min(max(lands_m + off_m, 0.0), STROKE_M)
+                self.position_m = min(max(lands_m + self.scattered_m(), 0.0), STROKE_M)
                 self.direction, self.stuck_m = s, self.position_m
                 break
         else:

@@ -55,6 +55,7 @@ COMMANDS = {
     "loops": "sim,plot",
     "reproduce": "sim,plot",
     "hide": "sim,plot",
+    "certify": "",
     "certificates": "tls",
     "completion": "completion",
 }

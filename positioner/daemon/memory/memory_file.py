@@ -44,14 +44,23 @@ def read_memory(path: Path, valve: str, conditions: Conditions) -> Kept:
     Raises:
         OSError: the file is there and cannot be read, or not be set aside.
     """
+    kept = look_at(path, valve, conditions)
+    if kept.problem is not None:
+        set_aside(path)
+    return kept
+
+
+def look_at(path: Path, valve: str, conditions: Conditions) -> Kept:
+    """Return what is kept of a valve and leave it where it is, whatever it is worth.
+
+    Raises:
+        OSError: the file is there and cannot be read.
+    """
     try:
-        text = path.read_bytes()
+        return _parsed(path.read_bytes(), valve, conditions)
     except FileNotFoundError:
         return Kept()
-    try:
-        return _parsed(text, valve, conditions)
     except _Unusable as error:
-        set_aside(path)
         return Kept(problem=str(error))
 
 

@@ -10,6 +10,7 @@
     stem_observation    what one step sees of the stem, also of an extended valve's
     reference_course    does the reference rest, or take back what would be corrected
     slide_bounds        what the site sets, and the thresholds
+    certificate         what can be proved of it on an identified valve
 
 Read them in this order.
 """
