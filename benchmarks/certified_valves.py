@@ -133,7 +133,7 @@ def wrongly_given(known: KnownValve) -> Iterator[str]:
 
 def report(valves: int, moves: int, seed: int) -> Iterator[str]:
     """Yield lines."""
-    refused, against, bad = Counter[str](), Counter[str](), Counter[str]()
+    refused, bad = Counter[str](), Counter[str]()
     given, slides, left = 0, [], []
     for number in range(valves):
         rng = np.random.default_rng([seed, number])
@@ -145,7 +145,6 @@ def report(valves: int, moves: int, seed: int) -> Iterator[str]:
         given += 1
         slides.append(found.most_slides)
         left += [f"valve {number}: {each}" for each in violated(drawn_inside(known, rng), found, moves)]
-        against[found.most_slides] += 1
         bad.update(wrongly_given(known))
     yield f"{valves} valves: certified {given}; not proved, for want of {dict(refused)}"
     if slides:

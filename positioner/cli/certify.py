@@ -25,15 +25,16 @@ def run(arguments: argparse.Namespace) -> int:
     from positioner.control.laws.slides.certificate import Refused
 
     proved = True
-    for file in load_valves(config_file(arguments)):
-        found = _certificate(file)
+    source = config_file(arguments)
+    for file in load_valves(source):
+        found = _certificate(file, source.parent)
         proved = proved and not isinstance(found, Refused)
         for line in _lines(file, found):
             print(line)
     return 0 if proved else 1
 
 
-def _certificate(file: "DaemonFile") -> "Certificate | Refused":
+def _certificate(file: "DaemonFile", folder: Path) -> "Certificate | Refused":
     from config.errors import InputError
     from positioner.control.laws.slides.certificate import Refused, certified, known_valve
     from positioner.control.laws.slides.slide_law import SlideSettings
@@ -47,7 +48,7 @@ def _certificate(file: "DaemonFile") -> "Certificate | Refused":
         raise InputError("law.valve", "must not be given: only the straight law and its landings are bounded")
     if file.memory.folder is None:
         raise InputError("memory.folder", "is required: what is known of the valve is read there")
-    path = memory_path(Path(file.memory.folder), file.valve.name)
+    path = memory_path(folder / file.memory.folder, file.valve.name)
     try:
         kept = look_at(path, file.valve.name, conditions_of(file))
     except OSError as error:

@@ -39,7 +39,7 @@ KNOWN = ValveKnowledge(
 def site(tmp_path: Path) -> Path:
     path = tmp_path / "site.toml"
     path.write_text(
-        f'[valve]\nname = "v"\nstroke_m = {STROKE_M}\n[memory]\nfolder = "{tmp_path}"\n'
+        f'[valve]\nname = "v"\nstroke_m = {STROKE_M}\n[memory]\nfolder = "kept"\n'
         '[device]\nbus = "modbus"\nhost = "127.0.0.1"\nport = 1\n'
     )
     return path
@@ -49,7 +49,8 @@ def keep(site: Path, knowledge: ValveKnowledge) -> None:
     (file,) = load_valves(site)
     assert isinstance(file, DaemonFile)
     assert file.memory.folder is not None
-    write_memory(memory_path(Path(file.memory.folder), "v"), "v", conditions_of(file), knowledge)
+    (site.parent / "kept").mkdir()
+    write_memory(memory_path(site.parent / file.memory.folder, "v"), "v", conditions_of(file), knowledge)
 
 
 def test_a_valve_that_is_known_well_has_its_certificate(site: Path, capsys: pytest.CaptureFixture[str]) -> None:
