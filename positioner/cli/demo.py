@@ -22,12 +22,13 @@ import shutil
 import sys
 import time
 from collections.abc import Iterator, Sequence
-from contextlib import contextmanager
+from contextlib import contextmanager, suppress
 from dataclasses import asdict, dataclass, replace
 from itertools import pairwise
 from pathlib import Path
 from typing import TYPE_CHECKING
 
+from config.codes import Mode
 from positioner.cli.parts.demo_folder import demo_folder, recording_in
 from positioner.cli.parts.output_files import writable, write_json
 from positioner.cli.parts.passing_line import passing
@@ -77,8 +78,12 @@ BEGUN_S, SETTLED_S = 0.1, 0.2
 """Of a step: until it is seen what the law does; the last part, over which the mean is its error."""
 IDENTIFICATIONS = 3
 """At most in a phase: a machine that is held up for a moment loses samples, and what they leave is refused."""
+STEP_TRIES = 2
+"""Of a step in which a fault was latched."""
 ACKNOWLEDGEMENTS = 10
-"""At most at the start, half a second apart: on a machine that is that busy replies are lost for seconds."""
+"""At most in a row, half a second apart: on a machine that is that busy replies are lost for seconds."""
+MOST_MISSED = 0.02
+"""Of the periods: a machine that misses more is busy with something else."""
 NEW = "new"
 """The phase before the packing ages."""
 SMALL = "small steps"
@@ -143,7 +148,25 @@ class DemoOutcome:
 
     @property
     def problems(self) -> list[str]:
-        """What does not hold."""
+        """What does not hold; at last that the machine was too busy, where it was."""
+        found = self._found
+        return [*found, self._busy] if found and self._busy else found
+
+    @property
+    def _busy(self) -> str:
+        made, missed, lost = (
+            sum(each[name] for each in self.cycles.values()) for name in ("cycles", "missed_periods", "lost_replies")
+        )
+        share = missed / max(missed + made, 1.0)
+        if not lost and share <= MOST_MISSED:
+            return ""
+        return (
+            f"the machine is too busy for the demo: {100 * share:.0f} % of the periods were missed, {lost:.0f} replies "
+            "lost; run it again when nothing else runs"
+        )
+
+    @property
+    def _found(self) -> list[str]:
         return (
             [
                 f"step to {step.reference_pu:g} p.u. ({step.phase}) ended {step.error_pu:+.4f} p.u. off"
@@ -242,7 +265,9 @@ def _both_laws(bus: str, folder: Path, valve: "ValveParameters") -> DemoOutcome:
             _print_line(f"the same valve; another daemon {daemon}; slides, the default law")
             slides = _play_slides(port_in(daemon), _aged(valve))
     return DemoOutcome(
-        paper.steps + slides.steps, paper.identified + slides.identified, {**paper.cycles, **slides.cycles}
+        paper.steps + slides.steps,
+        paper.identified + slides.identified,
+        {**paper.cycles, **slides.cycles},
     )
 
 
@@ -286,7 +311,7 @@ def _begin(dcs: "Dcs") -> None:
     """Look on while nothing moves; then choose automatic."""
     _observe(dcs, 0.5, "S0, nothing moves")
     _acknowledge(dcs)
-    dcs.set("mode", 2)
+    dcs.set("mode", Mode.AUTOMATIC)
 
 
 def _statistics(dcs: "Dcs") -> dict[str, float]:
@@ -295,16 +320,28 @@ def _statistics(dcs: "Dcs") -> dict[str, float]:
     return dcs.get_all(*(register.name for register in STATISTICS))
 
 
-def _acknowledge(dcs: "Dcs") -> None:
-    """Acknowledge, as an operator would, what was latched while the processes began on a busy machine; say it."""
+def _acknowledge(dcs: "Dcs") -> bool:
+    """Acknowledge, as an operator would, what a busy machine has latched, and say it; return whether anything was."""
     from config.codes import Fault
 
-    for _ in range(ACKNOWLEDGEMENTS):
+    for number in range(ACKNOWLEDGEMENTS):
         if not (fault := int(dcs.get("fault"))):
-            return
+            return number > 0
         _print_line(f"acknowledged: {Fault(fault).text}")
         dcs.set("acknowledge", 1)
         _observe(dcs, 0.5, "S0, nothing moves")
+    return True
+
+
+def _taken_up_again(dcs: "Dcs") -> None:
+    """Choose automatic again after a fault, from where the stem is; where it comes back meanwhile, it stays so."""
+    from positioner.dcs import DcsError
+
+    position_pu = dcs.get("position") if _acknowledge(dcs) else math.nan
+    if math.isfinite(position_pu):
+        with suppress(DcsError):
+            dcs.set("reference", min(max(position_pu, 0.0), 1.0))
+            dcs.set("mode", Mode.AUTOMATIC)
 
 
 def identify(dcs: "Dcs", phase: str, alpha_pa: float, valve: "ValveParameters") -> list[ComparedEstimate]:
@@ -321,6 +358,7 @@ def _identify(
         _show_passing(f"identifying ({phase}): {100 * progress:3.0f} %")
 
     for _ in range(IDENTIFICATIONS):
+        _taken_up_again(dcs)
         problem = dcs.identify(excitation, within_s, show)
         _print_line(f"identified ({phase})" if problem is None else f"identification ({phase}) failed: {problem}")
         if problem is None:
@@ -347,21 +385,30 @@ def _steps(
     step_s: float = STEP_S,
 ) -> list[StepOutcome]:
     """Make the steps; what is over after the packing has aged does not count for the packing that was identified."""
-    from config.codes import InhibitReason
-
     steps = []
     for reference_pu in references_pu:
-        dcs.set("reference", reference_pu)
-        label = f"{phase}: step to {reference_pu:g} p.u."
-        _observe(dcs, BEGUN_S, label)
-        while int(dcs.get("why")) == InhibitReason.ONE_DIRECTION:  # the sine has seen the stem move upward alone
-            _observe(dcs, BEGUN_S, label)
-        _observe(dcs, step_s - SETTLED_S - BEGUN_S, label)
-        settled_pu = _observe(dcs, SETTLED_S, label)
+        for _ in range(STEP_TRIES):
+            _taken_up_again(dcs)
+            settled_pu = _step(dcs, phase, reference_pu, step_s)
+            if not dcs.get("fault"):
+                break
         limit_now_pu = limit_pu if time.monotonic() < until_s else None
         steps.append(StepOutcome(phase, reference_pu, settled_pu - reference_pu, limit_now_pu))
     _print_line(f"{phase}: {len(steps)} steps, worst {max(abs(step.error_pu) for step in steps):.4f} p.u.")
     return steps
+
+
+def _step(dcs: "Dcs", phase: str, reference_pu: float, step_s: float) -> float:
+    """Make a step of the reference; return where the stem settles, p.u."""
+    from config.codes import InhibitReason
+
+    dcs.set("reference", reference_pu)
+    label = f"{phase}: step to {reference_pu:g} p.u."
+    _observe(dcs, BEGUN_S, label)
+    while int(dcs.get("why")) == InhibitReason.ONE_DIRECTION:  # the sine has seen the stem move upward alone
+        _observe(dcs, BEGUN_S, label)
+    _observe(dcs, step_s - SETTLED_S - BEGUN_S, label)
+    return _observe(dcs, SETTLED_S, label)
 
 
 def _observe(dcs: "Dcs", duration_s: float, label: str) -> float:

@@ -151,21 +151,34 @@ def test_steps_that_come_after_the_ageing_are_said_to_be_late_and_not_to_be_off(
     assert problem.startswith("the packing aged before the step to 0.5 p.u. (new) was over: the machine is too busy")
 
 
+def test_what_does_not_hold_on_a_busy_machine_says_so() -> None:
+    """At the end, once; a quiet machine is blamed for nothing, and a busy one on which all holds neither."""
+    for missed, lost, busy in ((10.0, 0.0, False), (900.0, 0.0, True), (0.0, 3.0, True)):
+        cycles = {"paper": {"cycles": 9000.0, "missed_periods": missed, "lost_replies": lost}}
+        *_, last = replace(outcome(ratio=2.0), cycles=cycles).problems
+        assert last.startswith("the machine is too busy for the demo: ") == busy
+        assert not replace(outcome(), cycles=cycles).problems
+
+
 class FaultyAtFirst:
     """A daemon whose device's replies are lost so many times."""
 
     def __init__(self, faults: int) -> None:
         self.faults = faults
+        self.said: list[str] = []
 
-    def get(self, _: str) -> float:
-        return Fault.NO_REPLY if self.faults else Fault.NONE
+    def get(self, name: str) -> float:
+        return 0.3 if name == "position" else Fault.NO_REPLY if self.faults else Fault.NONE
+
+    def identify(self, *_: object) -> str | None:
+        return None if self.said[-1:] in ([], ["mode"]) else "a fault is latched"
 
     def get_all(self, *names: str) -> dict[str, float]:
         return dict.fromkeys(names, 0.0)
 
     def set(self, name: str, _: float) -> None:
-        assert name == "acknowledge"
-        self.faults -= 1
+        self.said.append(name)
+        self.faults -= name == "acknowledge"
 
 
 @pytest.mark.parametrize(("faults", "left"), [(0, 0), (3, 0), (ACKNOWLEDGEMENTS + 1, 1)])
@@ -178,6 +191,16 @@ def test_faults_of_the_start_are_acknowledged_until_there_are_none(
     assert dcs.faults == left
 
 
+@pytest.mark.parametrize("faults", [0, 2])
+def test_a_fault_is_acknowledged_before_the_next_try_and_automatic_chosen_from_where_the_stem_is(
+    faults: int, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setattr(demo, "_observe", lambda *_: 0.0)
+    dcs = FaultyAtFirst(faults)
+    identify(dcs, "new", ALPHA_PA, load_valve(shipped_valve("seed")).valve)  # type: ignore[arg-type]
+    assert dcs.said == [*["acknowledge"] * faults, *["reference", "mode"] * (faults > 0)]
+
+
 class RefusedAtFirst:
     """A DCS to whom an identification is refused so many times."""
 
@@ -188,6 +211,9 @@ class RefusedAtFirst:
     def identify(self, *_: object) -> str | None:
         self.asked += 1
         return self.problems[min(self.asked, len(self.problems)) - 1]
+
+    def get(self, _: str) -> float:
+        return Fault.NONE
 
     def get_all(self, *names: str) -> dict[str, float]:
         return dict.fromkeys(names, 0.0)
