@@ -125,7 +125,7 @@ def decided_by(device: ScriptedDevice, driver: ModbusRtuDriver) -> ModbusRtuDriv
     line = driver._line
     send, receive = line.send, line.receive
 
-    def asking(frame: bytes, within_s: float) -> float:  # noqa: ARG001 - it passes by what the device does
+    def asking(frame: bytes, within_s: float) -> float:
         device.asked += 1
         return send(frame, PATIENCE_S)
 
