@@ -195,9 +195,9 @@ class Health:
         self.left_away_m = self.away_m if self._stands(sample, decision.reference_m) else 0.0
 
     def _stands(self, sample: Sample, reference_m: float) -> bool:
-        """Whether the stem has stood still under a reference, m, for as long as moves settle."""
+        """Whether the stem has stood still, but for noise, under a reference, m, for as long as moves settle."""
         at_m, asked_m, since_s = self._stood
-        if not (reference_m == asked_m and abs(sample.position_m - at_m) <= self.settings.dead_band_m):
+        if not (reference_m == asked_m and abs(sample.position_m - at_m) <= self._travel.band_m):
             self._stood, since_s = (sample.position_m, reference_m, sample.now_s), sample.now_s
         return sample.now_s - since_s >= self.settings.settle_s
 

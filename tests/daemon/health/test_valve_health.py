@@ -3,6 +3,7 @@
 from collections.abc import Callable, Mapping
 from dataclasses import replace
 
+import numpy as np
 import pytest
 from pymodbus.constants import ExcCodes
 
@@ -276,6 +277,26 @@ def test_a_move_given_up_away_from_its_reference_is_out_of_specification(
     decision = decision._replace(inhibit_reason=reason, reference_m=sample.position_m + away * STROKE_M)
     panel.health.enter(sample, decision, panel.cycle.requests)
     assert ne107_condition(decision, panel.health).causes == causes
+
+
+@pytest.mark.parametrize("noise", [0.0, 0.01])
+@pytest.mark.parametrize(("away", "missed"), [(0.05, False), (0.075, True), (-0.075, True), (0.2, True)])
+def test_a_stem_that_stands_6_percent_away_is_never_good_whatever_the_law_says(
+    away: float, missed: bool, noise: float
+) -> None:
+    panel, sample, decision = in_automatic()
+    reference_m = sample.position_m + away * STROKE_M
+    rng = np.random.default_rng(1)
+    for number in range(3000):
+        shown_m = sample.position_m + noise * STROKE_M * rng.uniform(-1.0, 1.0)
+        now = sample._replace(now_s=sample.now_s + 1e-3 * number, position_m=shown_m)
+        panel.health.enter(now, decision._replace(reference_m=reference_m), panel.cycle.requests)
+    for reason in InhibitReason:
+        of_it = decision._replace(reference_m=reference_m, inhibit_reason=reason)
+        assert (Ne107Cause.TRAVEL_DEVIATION in ne107_condition(of_it, panel.health).causes) >= missed, reason
+        assert ne107_condition(of_it, panel.health).status is not Ne107Status.GOOD or not missed, reason
+    silent = decision._replace(reference_m=reference_m, inhibit_reason=InhibitReason.NOTHING)
+    assert (ne107_condition(silent, panel.health).status is Ne107Status.GOOD) == (not missed)
 
 
 @pytest.mark.parametrize(
