@@ -101,6 +101,28 @@ BREAKAGES = (
         "if False:",
         "tests/control/test_restoration.py::test_what_a_device_did_by_itself_is_no_landing_and_drops_nothing",
     ),
+    Breakage(
+        "a sensor that drifts in S3 by a sine applies nothing beyond its deviation",
+        "positioner/estimation/batch.py",
+        "drifting = _fitted_beside(best, Beside.DRIFT, prior)",
+        "drifting = None",
+        "tests/control/test_sensor_matrix.py",
+    ),
+    Breakage(
+        "a sine that is broken off applies nothing",
+        "positioner/control/identifying.py",
+        "if excitation is not None and excitation.broken_off and memory.identification.estimates.progress < 1.0:",
+        "if False:",
+        "tests/control/test_late_cycles.py::test_a_sine_that_is_broken_off_applies_nothing",
+    ),
+    Breakage(
+        "a stem that stands away from its reference is never good",
+        "positioner/daemon/health/ne107.py",
+        "if given_up or health.left_away_m > MISSED * health.settings.stroke_m:",
+        "if given_up:",
+        "tests/daemon/health/test_valve_health.py::"
+        "test_a_stem_that_stands_6_percent_away_is_never_good_whatever_the_law_says",
+    ),
 )
 
 

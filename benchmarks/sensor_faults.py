@@ -1,4 +1,4 @@
-"""A position sensor that jumps or freezes in the middle of S3: what is accepted, and what of it is wrong?
+"""A position sensor that jumps, freezes or drifts in the middle of S3: what is accepted, and what of it is wrong?
 
     python -m benchmarks.sensor_faults [--cases 300] [--seed 0] [--kinds sine staircase]
 
@@ -7,11 +7,12 @@ The seed's valve with noise of 1e-4 of the stroke, in virtual time: S3 by a sine
 
     jump     by 0.05 to 30 % of the stroke, evenly in the logarithm, up or down
     freeze   at the value that it had
+    drift    by 0.05 to 30 % of the stroke a second (a staircase: in all of S3), evenly in the logarithm
 
 for one sample, for 1 to 1000 ms (a staircase: 30 periods), evenly in the logarithm, or for good. The clock of the
-device and its counter go on, so nothing but the values tells. What the law then uses is held against the truth: wrong
-is what lands a slide at mid-stroke, up or (after a staircase) down, more than three reported deviations and 0.2 % of
-the stroke elsewhere, whether the sensor is taken to be right before the jump or after it.
+device and its counter go on, so nothing but the values tells. A drift stays. What the law then uses is held against
+the truth: wrong is what lands a slide at mid-stroke, up or (after a staircase) down, more than three reported
+deviations and 0.2 % of the stroke elsewhere, whether the sensor is taken to be right before the jump or after it.
 """
 
 import argparse
@@ -65,15 +66,18 @@ EXPERIMENTS = (
 
 @dataclass(frozen=True, slots=True)
 class SensorFault:
-    """From `at_s` on for `over_s` the position is off by `by_m`, or, NaN, stays where it was."""
+    """From `at_s` on for `over_s` the position is off by `by_m` and `drift_m_per_s`, or, NaN, stays where it was."""
 
     at_s: float
     over_s: float
     by_m: float
+    drift_m_per_s: float = 0.0
 
     @property
     def kind(self) -> str:
         """Its name, and whether it passes."""
+        if self.drift_m_per_s:
+            return "drift"
         freeze = "freeze" if np.isnan(self.by_m) else "jump"
         return f"{freeze}, stays" if self.over_s == inf else freeze
 
@@ -93,11 +97,11 @@ class Spoilt:
         return getattr(self._device, name)
 
     def _measure(self) -> None:
-        fault = self._fault
-        if not fault.at_s <= self._device.device_time_us / 1e6 < fault.at_s + fault.over_s:
+        fault, now_s = self._fault, self._device.device_time_us / 1e6
+        if not fault.at_s <= now_s < fault.at_s + fault.over_s:
             self.position_m = self._device.position_m
         elif not np.isnan(fault.by_m):
-            self.position_m = self._device.position_m + fault.by_m
+            self.position_m = self._device.position_m + fault.by_m + fault.drift_m_per_s * (now_s - fault.at_s)
 
     def tick(self, command_pa: float) -> None:
         self._device.tick(command_pa)
@@ -114,7 +118,10 @@ def drawn(rng: np.random.Generator, each: Experiment) -> SensorFault:
         inf,
     )[rng.integers(3)]
     by_m = STROKE_M * exp(rng.uniform(log(SMALLEST), log(LARGEST))) * rng.choice((-1, 1))
-    return SensorFault(at_s, over_s, by_m if rng.random() < 0.6 else np.nan)
+    kind = rng.random()
+    if kind < 0.3:
+        return SensorFault(at_s, inf, 0.0, by_m / (each.s3_s if each.by_slides else 1.0))
+    return SensorFault(at_s, over_s, by_m if kind < 0.7 else np.nan)
 
 
 def identified(each: Experiment, fault: SensorFault, seed: int) -> tuple[Decision, str]:
@@ -189,7 +196,8 @@ def report(each: Experiment, cases: int, seed: int) -> Iterator[str]:
             if worst > 1.0:
                 yield (
                     f"    wrong: {fault.kind} at {fault.at_s:.3f} s for {fault.over_s:.4f} s by "
-                    f"{100 * fault.by_m / STROKE_M:.3f} %: off {worst:.1f} times what is allowed"
+                    f"{100 * fault.by_m / STROKE_M:.3f} %, {100 * fault.drift_m_per_s / STROKE_M:.3f} %/s: "
+                    f"off {worst:.1f} times what is allowed"
                 )
         counts.setdefault(fault.kind if number else "none", Counter())[what] += 1
     for kind, found in sorted(counts.items()):

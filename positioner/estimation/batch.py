@@ -27,6 +27,11 @@ every estimate less sure, beyond the deviation with which that is known:
 
     var += max(0, (θ - θ_drift)^2 - var_drift)
 
+A device on its own clock lets a command act somewhere between two samples. With Δu the change of the pressure from one
+to the next, Δu = α + β x where the motion has settled,
+
+    var(b/c) += (β/2)^2,    var(k/c) += (α/2)^2
+
 Break-away: F_s/A lies between the largest force at which the stem rested and the force at which it left,
 both u + (b/c) x in the direction of the motion. A held pressure jumps from one to the other; several events leave what
 their intervals share (`breakaway_force`).
@@ -65,6 +70,8 @@ SETTLED = 5.0
 FEWEST_LATER = 12
 LEAST_JITTER, LARGEST_JITTER = 0.005, 0.4
 """Of time stamps about an even grid, shares of the period, between which they may be those of samples taken evenly."""
+INSTANT = 0.5
+"""Of the time from one sample to the next, known of when a command acts."""
 TRAVELLED = 20.0
 """Standard deviations of the noise: a stem that was in places farther apart has moved, however slowly."""
 DETECTED_WITHIN = 3
@@ -174,7 +181,7 @@ def identify(
     told_apart = all(_clearly_better(best.fit, each) for each in others)
     drifting = _fitted_beside(best, Beside.DRIFT, prior)
     as_likely = [each for each in others if settings.sampling and not _clearly_better(best.fit, each)]
-    open_std = _open_std(best.fit, [*as_likely, drifting])
+    open_std = np.hypot(_open_std(best.fit, [*as_likely, drifting]), _open_by_instants(best, settings))
     stamps_s = even_s if best.evened and even_s is not None else t
     contradicted = _contradicted(best, stamps_s, x, noise_std_m, settings)
     together = _refusal_of_all(best, drifting, noise_std_m, settings)
@@ -224,6 +231,18 @@ def _open_std(fit: LikelihoodFit, others: list[LikelihoodFit | None]) -> Array:
             own = _widening(each) * np.diag(fit.gradient @ each.covariance @ fit.gradient.T)
             variance = np.maximum(variance, (fit.gradient @ (each.p - fit.p)) ** 2 - own)
     return np.asarray(np.sqrt(np.maximum(variance, 0.0)))
+
+
+def _open_by_instants(best: "_Hypothesis", settings: BatchSettings) -> Array:
+    """Return by how much θ of a device's samples is open, (6,), whose commands act somewhere between two of them."""
+    open_std = np.zeros(6)
+    settled = [each for each in _settled(best) if len(each.time_s) > 2]
+    if settings.sampling and settled:
+        x = np.concatenate([each.position_m[1:] for each in settled])
+        changes = np.concatenate([np.diff(each.pressure_pa) for each in settled])
+        if float(np.ptp(x)) > 0.0:
+            open_std[4:] = np.abs(np.polyfit(x, changes, 1)) * INSTANT
+    return open_std
 
 
 def _why_nothing(best: "_Hypothesis", position_m: Array, noise_std_m: float | None) -> Refusal:
@@ -461,16 +480,27 @@ def _refusal_of_each(best: _Hypothesis, fit: LikelihoodFit, largest: float) -> R
     return Refusal.VALID
 
 
+def _settled(best: _Hypothesis) -> list[MotionSegment]:
+    """Return the motions without their first five time constants."""
+    assert best.fit is not None
+    settled_s = SETTLED * float(np.exp(max(best.fit.p[0], best.fit.p[1] / 2)))
+    firsts = [int(np.searchsorted(each.time_s, each.time_s[each.begins] + settled_s)) for each in best.chosen]
+    return [
+        MotionSegment(
+            each.direction,
+            each.time_s[first:],
+            each.position_m[first:],
+            each.pressure_pa[first:],
+            begins=0,
+            earliest=0,
+        )
+        for each, first in zip(best.chosen, firsts, strict=True)
+    ]
+
+
 def _mass_identifiable_later(best: _Hypothesis, fit: LikelihoodFit, largest: float) -> bool:
     """Return whether ln μ is known well enough without the first five time constants of every motion."""
-    settled_s = SETTLED * float(np.exp(max(fit.p[0], fit.p[1] / 2)))
-    later = []
-    for each in best.chosen:
-        first = int(np.searchsorted(each.time_s, each.time_s[each.begins] + settled_s))
-        if len(each.time_s) - first >= FEWEST_LATER:
-            rows = slice(first, None)
-            time_s, position_m, pressure_pa = each.time_s[rows], each.position_m[rows], each.pressure_pa[rows]
-            later.append(MotionSegment(each.direction, time_s, position_m, pressure_pa, begins=0, earliest=0))
+    later = [each for each in _settled(best) if len(each.time_s) >= FEWEST_LATER]
     again = fit_motions(later, held=best.interpolation != "linear", guess=fit.p[:2]) if later else None
     return again is not None and float(again.covariance[1, 1]) ** 0.5 <= largest
 
