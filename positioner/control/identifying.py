@@ -47,7 +47,11 @@ def identify(
     if fresh:
         at_rest = memory.statics.detector.rest is not None
         memory.identification.look_on(sample.time_s, sample.position_m, sample.pressure_pa, at_rest=at_rest)
-    return False, _tested(memory) if memory.identifying and not by_slides else applied
+    if not memory.identifying or by_slides:
+        return False, applied
+    if excitation is not None and excitation.broken_off and memory.identification.estimates.progress < 1.0:
+        return False, applied.refused(Refusal.BROKEN_OFF)
+    return False, _tested(memory)
 
 
 def _moves_count(excitation: ActiveExcitation | None, requests: Requests, *, by_slides: bool) -> bool:

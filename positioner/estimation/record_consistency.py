@@ -15,7 +15,7 @@ neither the sample nor the command between two samples is known to the period:
 Where the pressure rises over several samples, x_0 and v_0 are fitted where the stem is first seen in motion. They must
 be what a rest leads to, in direction s, but for what lateness leaves open:
 
-    s (x_0 - x_rest) >= -x' L,    s v_0 >= -x'
+    s (x_0 - x_rest) >= -x' L - g D,    s v_0 >= -x'
 
 A stem with Coulomb friction cannot turn round without a rest, unless the pressure falls by 2 F_c meanwhile, and then
 the response ends there.
@@ -62,7 +62,7 @@ def contradicts(stretch: MotionSegment, fit: LikelihoodFit, allowed_m: float, *,
         beginning = np.column_stack((X_0[1:], X_1[1:]))
         x_0, v_0 = np.linalg.lstsq(beginning, left)[0].tolist()
         left = left - beginning @ (x_0, v_0)
-        if stretch.begins and _leaves_no_rest(stretch, motion, x_0, v_0, allowed_m * _deviations(beginning)):
+        if stretch.begins and _leaves_no_rest(stretch, motion, x_0, v_0, g, allowed_m * _deviations(beginning)):
             return True
     else:
         left = left - motion.rest_m * X_0[1:]
@@ -79,19 +79,22 @@ def _deviations(columns: Array) -> Array:
     return np.asarray(np.sqrt(np.diag(np.linalg.pinv(columns.T @ columns))))
 
 
-def _leaves_no_rest(stretch: MotionSegment, motion: PreparedMotion, x_0: float, v_0: float, std: Array) -> bool:
+def _leaves_no_rest(
+    stretch: MotionSegment, motion: PreparedMotion, x_0: float, v_0: float, g: float, std: Array
+) -> bool:
     """Return whether a motion whose beginning was not seen cannot have begun from the rest before it.
 
     Args:
         stretch: with that rest.
         motion: from where it is first seen.
         x_0, v_0: fitted there, m and m/s.
+        g: of the fit, m/Pa.
         std: of the two.
     """
     s, rest_m = stretch.direction, float(stretch.position_m[: stretch.begins].mean())
     steps, first = np.diff(motion.time_s)[1 : FIRST + 1], motion.position_m[: FIRST + 1]
     speed = abs(float(np.median(np.diff(first) / steps))) if len(steps) else 0.0
-    late_m = speed * float(steps.max(initial=0.0))
+    late_m = speed * float(steps.max(initial=0.0)) + g * float(_hidden_changes_pa(motion)[: FIRST + 1].sum())
     back_m, back_m_per_s = -s * (x_0 - rest_m), -s * v_0
     return back_m > CERTAIN * float(std[0]) + late_m or back_m_per_s > CERTAIN * float(std[1]) + speed
 
@@ -108,17 +111,23 @@ def _begun_as_fitted(motion: PreparedMotion, fit: LikelihoodFit) -> PreparedMoti
 def _open_by_lateness_m(motion: PreparedMotion, way: Array, g: float, tau: float) -> Array:
     """Return how far the stem may be off for samples and commands that are late, abs(x') L + g D, m: (n,)."""
     steps = np.maximum(np.diff(motion.time_s), 1e-9)
-    period_s = float(np.median(steps))
     late_s = _largest_near(steps)
     if not motion.free_velocity:
         late_s = np.maximum(late_s, steps[0])
-    changes = np.abs(np.diff(motion.pressure_pa)) * (steps > LATE * period_s)
-    changes[0] = 0.0  # when that came is fitted, and of its instant x' says what is open
+    changes = _hidden_changes_pa(motion)
     open_pa, kept = np.zeros_like(changes), 0.0
     for at, (change, step) in enumerate(zip(changes.tolist(), steps.tolist(), strict=True)):
         kept = kept * exp(-step / tau) + change
         open_pa[at] = kept
     return np.asarray(_largest_near(way / steps) * late_s + g * open_pa)
+
+
+def _hidden_changes_pa(motion: PreparedMotion) -> Array:
+    """Return the changes of the pressure over intervals that hide when they came, Pa: (n,)."""
+    steps = np.diff(motion.time_s)
+    changes = np.abs(np.diff(motion.pressure_pa)) * (steps > LATE * float(np.median(steps)))
+    changes[0] = 0.0  # when that came is fitted, and of its instant x' says what is open
+    return np.asarray(changes)
 
 
 def _largest_near(values: Array) -> Array:

@@ -12,7 +12,8 @@ resting place before it, and ends where they reach the one after it, which an en
 so cut at the impact, whatever the pressure does afterwards.
 """
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
+from itertools import pairwise
 from math import sqrt
 from typing import NamedTuple
 
@@ -32,7 +33,7 @@ before it."""
 JUMP = 100.0
 """Ratio of a step of the pressure to those after it that makes it the one that moved the stem."""
 BROKEN = 20.0
-"""A step of time longer than so many mean ones breaks the record."""
+"""A step of time longer than so many median ones breaks a motion in two."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -89,10 +90,9 @@ def find_motions(
         segment, bounds = _trimmed(
             time_s, position_m, pressure_pa, Stretch(before, begin, end, after), direction, window, noise_std_m
         )
-        if segment is None or _is_broken(segment, period_s):
-            too_short += 1
-        else:
-            segments.append(segment)
+        pieces = _unbroken(segment, period_s) if segment is not None else []
+        too_short += not pieces
+        segments += pieces
         rests.append((before, bounds[0]))
         before = bounds[1]
     rests.append((before, len(time_s)))
@@ -254,5 +254,19 @@ def _reaches_rest(travel: Array, begin: int, end: int, after: int, band: float, 
     return begin + int(reached[0]) if len(reached) else end
 
 
-def _is_broken(segment: MotionSegment, period_s: float) -> bool:
-    return float(np.diff(segment.time_s).max()) > BROKEN * period_s
+def _unbroken(segment: MotionSegment, period_s: float) -> list[MotionSegment]:
+    """Return the pieces of a motion between breaks of the record, each long enough to be fitted."""
+    breaks = np.flatnonzero(np.diff(segment.time_s) > BROKEN * period_s) + 1
+    edges = [0, *breaks.tolist(), len(segment.time_s)]
+    return [
+        replace(
+            segment,
+            time_s=segment.time_s[first:last],
+            position_m=segment.position_m[first:last],
+            pressure_pa=segment.pressure_pa[first:last],
+            begins=max(0, segment.begins - first),
+            earliest=max(0, segment.earliest - first),
+        )
+        for first, last in pairwise(edges)
+        if last - max(first, segment.begins) >= 2 * FEWEST
+    ]

@@ -1,13 +1,15 @@
 """Cycles of a busy machine come late: samples are missed, commands act late. What S3 finds is applied all the same."""
 
+from dataclasses import replace
 from typing import Any
 
 import numpy as np
 import pytest
 
-from config.codes import Mode
+from config.codes import Mode, Refusal
 from config.daemon_file import DaemonFile
 from positioner.control.requests import Requests
+from positioner.daemon.cycle import Cycle
 from positioner.virtual.virtual_cycle import identified, virtual_cycle
 from tests.cases import few_always
 from tests.control.other_plant import SEED_LIKE, OtherPlant, with_friction
@@ -34,14 +36,15 @@ class Busy:
         self.plant.tick(command_pa)
 
 
-@pytest.mark.parametrize("share", [0.02, 0.1])
-@pytest.mark.parametrize("seed", few_always(range(8), 2))
-def test_an_aged_packing_is_identified_by_late_cycles(seed: int, share: float) -> None:
-    packing = with_friction(SEED_LIKE, AGED)
-    plant = OtherPlant(packing, PERIOD_S, at_pu=0.0, noise_std_m=1e-5, seed=seed)
+PACKING = with_friction(SEED_LIKE, AGED)
+
+
+def begun(share: float, seed: int) -> Cycle:
+    """Return a cycle that has looked on for a while."""
+    plant = OtherPlant(PACKING, PERIOD_S, at_pu=0.0, noise_std_m=1e-5, seed=seed)
     file = DaemonFile.model_validate(
         {
-            "valve": {"stroke_m": packing.stroke_m},
+            "valve": {"stroke_m": PACKING.stroke_m},
             "cycle": {"pace": "device", "period_s": PERIOD_S},
             "control": {"law": "seed"},
         }
@@ -50,10 +53,33 @@ def test_an_aged_packing_is_identified_by_late_cycles(seed: int, share: float) -
     cycle = virtual_cycle(file, Busy(plant, seed, share), first)
     for _ in range(300):
         cycle.once()
+    return cycle
+
+
+@pytest.mark.parametrize("share", [0.02, 0.1])
+@pytest.mark.parametrize("seed", few_always([0, 3, 1, 2, 4, 5, 6, 7], 2))
+def test_an_aged_packing_is_identified_by_late_cycles(seed: int, share: float) -> None:
+    cycle = begun(share, seed)
     for _ in identified(cycle, 5.0, wait=False):
         pass
     applied, estimates = cycle.snapshot.decision.applied, cycle.snapshot.decision.estimates
     assert applied.ratios is not None, applied.last_refusal.name
-    slope, friction_pa = packing.spring_n_per_m / packing.area_m2, packing.coulomb_n / packing.area_m2
-    middle_pa = applied.ratios.balance_pa(0.5 * packing.stroke_m, 1) - (0.5 * packing.stroke_m * slope + friction_pa)
-    assert abs(middle_pa) < max(NEAR * slope * packing.stroke_m, DEVIATIONS * estimates.k_over_c.std)
+    slope, friction_pa = PACKING.spring_n_per_m / PACKING.area_m2, PACKING.coulomb_n / PACKING.area_m2
+    middle_pa = applied.ratios.balance_pa(0.5 * PACKING.stroke_m, 1) - (0.5 * PACKING.stroke_m * slope + friction_pa)
+    assert abs(middle_pa) < max(NEAR * slope * PACKING.stroke_m, DEVIATIONS * estimates.k_over_c.std)
+
+
+@pytest.mark.parametrize("mode", [Mode.HOLD, Mode.MANUAL])
+def test_a_sine_that_is_broken_off_applies_nothing(mode: Mode) -> None:
+    """What it has by then nobody has examined."""
+    cycle = begun(0.02, 0)
+    asked = replace(cycle.requests, eta=(0, 0, 0))
+    cycle.requests = asked
+    while not cycle.snapshot.decision.estimates.acceptable:
+        cycle.once()
+    assert cycle.snapshot.decision.estimates.progress < 0.9
+    cycle.requests = replace(asked, mode=mode, mode_writes=2)
+    for _ in range(3):
+        cycle.once()
+    applied = cycle.snapshot.decision.applied
+    assert (applied.count, applied.refusals, applied.last_refusal) == (0, 1, Refusal.BROKEN_OFF)

@@ -114,9 +114,10 @@ def test_nothing_is_applied_beyond_its_deviation_whatever_the_sensor_does(spoile
 
 
 @pytest.mark.parametrize("at_s", few_always([0.12, 0.3, 0.5]))
-@pytest.mark.parametrize("gap_s", [0.02, 0.1])
-def test_nor_over_a_gap(gap_s: float, at_s: float) -> None:
-    assert_nothing_wrong(identified(Spoiled("spike", 0.0, at_s), gap_s))
+@pytest.mark.parametrize("gap_s", [0.02, 0.03, 0.1])
+@pytest.mark.parametrize("spoiled", [("spike", 0.0), ("drift", 0.01)])
+def test_nor_over_a_gap(spoiled: tuple[str, float], gap_s: float, at_s: float) -> None:
+    assert_nothing_wrong(identified(Spoiled(*spoiled, at_s), gap_s))
 
 
 def test_a_good_sensor_is_applied() -> None:
