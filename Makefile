@@ -8,7 +8,7 @@ READY  := $(VENV)/.ready
 
 venv: $(READY)
 
-$(READY): pyproject.toml
+$(READY): pyproject.toml positioner/__init__.py
 	$(PYTHON) -m venv --upgrade-deps $(VENV)
 	@# Modules are compiled when they are first imported: most of what comes with the packages never is.
 	$(BIN)/python -m pip install --quiet --disable-pip-version-check --no-compile --editable '.[dev]'

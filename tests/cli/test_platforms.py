@@ -20,7 +20,15 @@ PROFILES = ROOT / "config" / "profiles"
 JUDGES = ROOT.parent / "shared" / "cases" / "exports" / "26-platform"
 WITHIN_S = 120.0
 ROOMS = ("config", "signals", "webpage", "sim", "workbench", "fieldbus", "drivers", "positioner", "northbound")
-OF_POSIX_ALONE = ("daemon/ending", "daemon/service.py", "positioner/testing/", "parts/pseudo_line", "terminal.py")
+OF_POSIX_ALONE = (
+    "daemon/ending",
+    "daemon/service.py",
+    "daemon/assembled_valves.py",
+    "daemon/workers.py",
+    "positioner/testing/",
+    "parts/pseudo_line",
+    "terminal.py",
+)
 """What a daemon, a serial line and the tests of others need."""
 
 
