@@ -28,7 +28,8 @@ def run(arguments: argparse.Namespace) -> int:
     require_ready(file, arguments)
     valve, bounds, stroke_m = RunningValve(file, arguments), bounds_of(file), file.valve.stroke_m
     start_pa = valve.command_pa()
-    programs = tuple(programme(asked, bounds, start_pa, stroke_m, way) for way in (1, -1))
+    dead_band_pa = valve.dead_band_pa()
+    programs = tuple(programme(asked, bounds, start_pa, stroke_m, way, dead_band_pa) for way in (1, -1))
     with playing(TEST, file, arguments):
         played = played_all(valve, programs)
     outcome = continuous_stroke(played, asked, file.valve.name, stroke_m, valve.slope_pa_per_m())

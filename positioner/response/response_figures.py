@@ -13,6 +13,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from config.arguments import kinds_held
+from config.drive import Scale
 from config.noise import quantum_m
 from config.plausibility import odd_sizes
 from config.recording import Column, Recording
@@ -49,7 +50,7 @@ def respond(recording: Recording) -> ResponseFigures:
         segments = list(_input_segments(recording, name, whole))
         found = [(segment, _steps(segment, follows=name == "reference_m")) for segment in segments]
         if any(steps for _, steps in found):
-            return _response(name, found, notes)
+            return _response(name, found, notes, recording.kind.length)
         notes.append(f"{name} does not step from one held value to another")
     nothing = undetermined("the recording holds no step")
     return ResponseFigures("none", (), None, nothing, nothing, nothing, tuple(notes))
@@ -88,11 +89,13 @@ def _steps(segment: _InputSegment, *, follows: bool) -> list[StepChange]:
     return [step for step in steps if not (follows and same[step.first])]
 
 
-def _response(name: str, found: list[tuple[_InputSegment, list[StepChange]]], notes: list[str]) -> ResponseFigures:
+def _response(
+    name: str, found: list[tuple[_InputSegment, list[StepChange]]], notes: list[str], read: Scale
+) -> ResponseFigures:
     is_reference = name == "reference_m"
     rounding_m = quantum_m(np.concatenate([segment.position_m for segment, _ in found]))
     if rounding_m:
-        notes.append(f"positions are whole multiples of {rounding_m:.3g} m")
+        notes.append(f"positions are whole multiples of {read.said(rounding_m)}")
     steps = tuple(
         figures_of(segment.time_s, segment.position_m, step, rounding_m, is_reference=is_reference)
         for segment, steps in found

@@ -1,8 +1,9 @@
 """The report of a valve, as found and as left: one HTML file that fetches nothing, or a PDF, from the records kept.
 
     device and configuration        of the newest record
+    what has changed                since the factory, in the technician's words
     a table a test                  each figure recommended, as found, as left, and factory's, each with its +-
-    what has changed                from as found to as left, and since the factory, by how many deviations
+    and what of them has changed    from as found to as left, and since the factory, by how many deviations
     pictures                        as found and as left, drawn into one
     signed                          who tested, who accepted
 
@@ -107,6 +108,22 @@ class ValveReport:
                     told.append(table)
         return told
 
+    def findings(self) -> list[str]:
+        """Return what the figures mean that have changed since the factory or, without one, until as left, in words."""
+        told = []
+        for test in self.tests():
+            kept = self.kept(test)
+            for before, after in (("factory", "as_found"), ("factory", "as_left"), ("as_found", "as_left")):
+                if before not in kept or after not in kept or (before == "as_found" and "factory" in kept):
+                    continue
+                told += [
+                    f"{test}, {TITLES[after]}: {each.means} ({each.quantity.text} {each.quantity.shown}, "
+                    f"{TITLES[before]} {each.before.shown})"
+                    for each in changes(kept[after].outcome, kept[before].outcome)
+                    if each.changed and each.means
+                ]
+        return told
+
     def _value(self, quantity: Quantity) -> float | None:
         return self.recommended.get(quantity.name, quantity.expected)
 
@@ -149,6 +166,7 @@ def as_html(report: ValveReport) -> str:
     parts = [
         f"<h1>{escape(title)}</h1><p class='quiet'>written {now:%Y-%m-%d %H:%M} UTC; every ± is two standard deviations"
         f" or half a bracket; what cannot be determined says why; {MARK}</p>",
+        _findings(report),
         *(_section(report, each) for each in report.tests()),
         f"<section><h2>Configuration</h2>{_configuration(report)}</section>",
         "<section><h2>Signed</h2><dl>" + "".join(f"<div><dt>{each}</dt></div>" for each in SIGNED) + "</dl></section>",
@@ -174,6 +192,7 @@ def write_pdf(report: ValveReport, path: "Path") -> None:
 
     figures, pages = needed("matplotlib.figure", "report"), needed("matplotlib.backends.backend_pdf", "report")
     with pages.PdfPages(path) as pdf:
+        _page(figures, pdf, f"Valve {report.valve}: what has changed", "\n".join(report.findings()))
         for test in report.tests():
             texts = [as_text([report.table(test)]), *(as_text([each]) for each in report.changed(test))]
             _page(figures, pdf, f"Valve {report.valve}: {test}", "\n\n".join(texts))
@@ -203,6 +222,12 @@ def _page(figures: Any, pdf: Any, title: str, text: str) -> None:
     size = min(8.0, 1150.0 / max(widest, 1), 480.0 / max(1, text.count("\n") + 1) * 1.1)
     figure.text(0.04, 0.90, text, fontsize=size, family="monospace", va="top")
     pdf.savefig(figure)
+
+
+def _findings(report: ValveReport) -> str:
+    told = report.findings() or ["no figure has changed that says what is wrong"]
+    lines = "".join(f"<li>{escape(each)}</li>" for each in told)
+    return f"<section><h2>What has changed</h2><ul>{lines}</ul></section>"
 
 
 def _section(report: ValveReport, test: str) -> str:

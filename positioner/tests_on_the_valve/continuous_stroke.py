@@ -25,6 +25,9 @@ RATE = 5e-4
 """Of the command's range, per second."""
 MOST = 0.02
 """Of the stroke: farther it may not move the stem of a valve in operation."""
+ONE_WAY = 0.45
+"""Of the time limit: forth, and once it has moved, back."""
+SHORTEST_WAY_S = 1.0
 START = 0.003
 """Of the stroke: motion that ends it."""
 
@@ -52,12 +55,30 @@ class ContinuousStroke:
                 raise InputError(option, f"allowed is {low:g} to {high:g}, got {value:g}")
 
 
-def programme(asked: ContinuousStroke, bounds: Bounds, start_pa: float, stroke_m: float, way: int) -> Program:
-    """Return the program of one way: to the limit of the command, or as far as half the time limit permits."""
+def programme(
+    asked: ContinuousStroke,
+    bounds: Bounds,
+    start_pa: float,
+    stroke_m: float,
+    way: int,
+    dead_band_pa: float | None = None,
+) -> Program:
+    """Return the program of one way: to the limit of the command, or as far as half the time limit permits.
+
+    Raises:
+        InputError: a stem of this dead band, where it is known, would not be reached in that time.
+    """
     asked.require_possible()
     rate = asked.rate * (bounds.maximum_pa - bounds.minimum_pa)
-    # Forth and, once it has moved, back.
-    farthest_pa = rate * max(1.0, 0.45 * bounds.longest_s - HELD_S)
+    within_s = max(SHORTEST_WAY_S, ONE_WAY * bounds.longest_s - HELD_S)
+    farthest_pa = rate * within_s
+    if dead_band_pa is not None and farthest_pa < dead_band_pa:
+        needed = asked.rate * dead_band_pa / farthest_pa
+        raise InputError(
+            "--rate",
+            f"at {asked.rate:g} the command goes {farthest_pa:.4g} Pa in half of experiment.limit_s, and the stem may "
+            f"need {dead_band_pa:.4g} Pa: allowed is {needed:.2g} or more, or a longer limit",
+        )
     limit_pa = (
         min(bounds.maximum_pa, start_pa + farthest_pa) if way > 0 else max(bounds.minimum_pa, start_pa - farthest_pa)
     )

@@ -87,7 +87,7 @@ def programme(
 def small_steps(recording: Recording, valve: str, stroke_m: float, slope_pa_per_m: float | None = None) -> Outcome:
     """Return what the steps show; the slope is the spring rate over the area, where it is known."""
     told = {name: recording.columns[name] for name in ("time_s", "position_m")}
-    response = respond(Recording(told | {"command_pa": _in_steps(recording.command_pa)}))
+    response = respond(Recording(told | {"command_pa": _in_steps(recording.command_pa)}, recording.metadata))
     gain = response.static_gain.value
     moved = [each for each in response.steps if gain and responded(each, gain)]
     quantities = [

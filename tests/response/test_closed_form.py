@@ -227,7 +227,7 @@ def test_a_rounding_transmitter_is_recognised_and_its_chatter_is_no_response() -
     recording = first_order(np.arange(0, 8, 0.005), 3.0, 0.1, 0.3, 0.01)
     columns = dict(recording.columns) | {"position_m": np.round(recording.position_m / quantum_m) * quantum_m}
     response = respond(replace(recording, columns=columns))
-    assert response.notes == ("positions are whole multiples of 2.5e-05 m",)
+    assert response.notes == ("positions are whole multiples of 0.025 mm",)
     dead, t63, *_ = the_step(response)
     assert dead.value == pytest.approx(0.1, abs=0.01)
     assert t63.value == pytest.approx(0.1 + 0.3 * -math.log(1 - T63), abs=0.01)

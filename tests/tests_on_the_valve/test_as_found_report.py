@@ -104,7 +104,7 @@ def test_a_pdf_has_a_page_for_each(site: Path, tmp_path: Path) -> None:
     out = tmp_path / "FV-1.pdf"
     assert main(["report", str(site), "-o", str(out)]) == 0
     pages = re.findall(rb"/Type /Page\b", out.read_bytes())
-    assert len(pages) == 4, "signature and its pictures, commissioning, configuration"
+    assert len(pages) == 5, "what has changed, signature and its pictures, commissioning, configuration"
 
 
 @contextmanager

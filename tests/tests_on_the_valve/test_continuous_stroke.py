@@ -59,6 +59,12 @@ def test_a_slip_beyond_what_operation_allows_is_told() -> None:
     assert ValveTestVerdict.TRAVEL_EXCEEDED in outcome.verdicts
 
 
+def test_a_rate_at_which_the_time_is_too_short_is_refused_before_anything_moves() -> None:
+    bounds = Settings.of(daemon_file(experiment={"limit_s": 60.0})).experiment
+    with pytest.raises(InputError, match=r"--rate: at 0\.0005 the command goes 1750 Pa .* allowed is 0\.0036 or more"):
+        programme(ContinuousStroke(), bounds, 60e3, STROKE_M, 1, 880.0 / AREA_M2)
+
+
 def test_what_cannot_be_is_refused() -> None:
     with pytest.raises(InputError, match=r"--start: allowed is 0\.0001 to 0\.01, got 0\.5"):
         ContinuousStroke(start=0.5).require_possible()

@@ -1,6 +1,7 @@
 """No test leaves its window by more than its declared margin, whatever happens; and where the valve is after it.
 
-Faults of the device, of the DCS and of whoever tests are drawn, at any moment of a partial or a continuous stroke.
+Faults of the device, of the DCS and of whoever tests are drawn, at any moment of a partial stroke, a continuous stroke
+or small steps; so is what `[safety]` does on a fault.
 """
 
 from collections.abc import Callable
@@ -12,9 +13,18 @@ import pytest
 from config.codes import ExperimentState, Fault, Mode
 from config.slave_file import DeviceFault, Initial
 from positioner.control.settings import Settings
-from positioner.tests_on_the_valve import continuous_stroke, partial_stroke
+from positioner.tests_on_the_valve import continuous_stroke, partial_stroke, small_steps
 from positioner.tests_on_the_valve.program import Program
-from tests.tests_on_the_valve.virtual_valve import PERIOD_S, SLOPE, STROKE_M, VirtualValve, daemon_file, told
+from tests.tests_on_the_valve.virtual_valve import (
+    AREA_M2,
+    MAXIMUM_PA,
+    PERIOD_S,
+    SLOPE,
+    STROKE_M,
+    VirtualValve,
+    daemon_file,
+    told,
+)
 
 TIGHT = told(coulomb_n=400.0, static_n=440.0)
 SLIP_M = 2.0 * 40.0 / 140e3
@@ -25,6 +35,9 @@ RATE_PA_PER_S = 20e3
 JUMP_M = 0.05 * STROKE_M
 CALM, BY_MODE = "no fault", "another mode"
 DEVICE = ("jump", "nan", "supply", "drift")
+ENDS_AT_PA = {"hold": None, "vent": 0.0, "fill": MAXIMUM_PA}
+"""What is commanded after a fault, by `[safety] action`; None: what was commanded before it."""
+TESTS = ("partial", "fast", "continuous", "steps")
 PEOPLE = ("veto", "no consent", "hold", "nothing", "twice")
 
 
@@ -35,16 +48,15 @@ class Drawn:
     what: str
     at_s: float
     opening: float
-    fast: bool
-    creeping: bool
+    test: str
+    action: str
 
     @classmethod
     def by(cls, seed: int) -> "Drawn":
         draw = np.random.default_rng(seed)
         what = str(draw.choice(DEVICE + PEOPLE))
-        return cls(
-            what, float(draw.uniform(0.2, 16.0)), float(draw.uniform(0.1, 0.9)), *(draw.random(2) < 0.4).tolist()
-        )
+        at_s, opening = float(draw.uniform(0.2, 16.0)), float(draw.uniform(0.15, 0.85))
+        return cls(what, at_s, opening, str(draw.choice(TESTS)), str(draw.choice(list(ENDS_AT_PA))))
 
     @property
     def faults(self) -> tuple[DeviceFault, ...]:
@@ -56,14 +68,16 @@ class Drawn:
 
 def asked_of(valve: VirtualValve, drawn: Drawn) -> tuple[Program, float]:
     """Return the program, and the band that it declares, m."""
-    bounds = Settings.of(valve.file).experiment
-    if drawn.creeping:
+    bounds, start_pa = Settings.of(valve.file).experiment, valve.command_pa()
+    if drawn.test == "continuous":
         way = 1 if drawn.opening < 0.5 else -1
         asked = continuous_stroke.ContinuousStroke(rate=5e-3)
-        program = continuous_stroke.programme(asked, bounds, valve.command_pa(), STROKE_M, way)
+        program = continuous_stroke.programme(asked, bounds, start_pa, STROKE_M, way)
+    elif drawn.test == "steps":
+        program = small_steps.programme(small_steps.SmallSteps(840.0 / AREA_M2, 0.4), bounds, start_pa, STROKE_M)
     else:
-        wanted = partial_stroke.PartialStroke(fast=drawn.fast)
-        program = partial_stroke.programme(wanted, bounds, valve.command_pa(), valve.device.stem_m, STROKE_M)
+        wanted = partial_stroke.PartialStroke(fast=drawn.test == "fast")
+        program = partial_stroke.programme(wanted, bounds, start_pa, valve.device.stem_m, STROKE_M)
     return program, program.band_m
 
 
@@ -84,7 +98,7 @@ def people(valve: VirtualValve, drawn: Drawn) -> None:
 
 def run(seed: int) -> None:
     drawn = Drawn.by(seed)
-    file = daemon_file(experiment={"rate_limit_pa_per_s": RATE_PA_PER_S})
+    file = daemon_file(experiment={"rate_limit_pa_per_s": RATE_PA_PER_S}, safety={"action": drawn.action})
     stem_m = drawn.opening * STROKE_M
     initial = Initial(position_m=stem_m, pressure_pa=20e3 + SLOPE * stem_m)
     valve = VirtualValve(TIGHT, file, initial=initial, faults=drawn.faults, noise=1e-4, seed=seed)
@@ -104,7 +118,7 @@ def run(seed: int) -> None:
 
     valve._turn = watched
     played = valve.play(program)
-    speed = (RATE_PA_PER_S if drawn.fast and not drawn.creeping else 140e3 / 60.0) / SLOPE
+    speed = (RATE_PA_PER_S if drawn.test in ("fast", "steps") else 140e3 / 60.0) / SLOPE
     lied_m = JUMP_M if drawn.what in ("jump", "drift") else 0.0
     if drawn.what == "supply":  # the air is gone: the spring closes it, whatever is commanded
         lied_m = begun_m
@@ -115,6 +129,8 @@ def run(seed: int) -> None:
     after_pa = valve.command_pa()
     if decision.fault is not Fault.NONE:
         assert (played.state, decision.mode) == (ExperimentState.FAULT, Mode.HOLD), (seed, drawn)
+        ends_at_pa = ENDS_AT_PA[drawn.action]
+        assert ends_at_pa in (None, after_pa), (seed, drawn, after_pa)
     elif drawn.what == "hold" and played.state is ExperimentState.NOT_AUTOMATIC:
         assert decision.mode is Mode.HOLD
         assert after_pa == held_pa, (seed, drawn)
@@ -123,7 +139,12 @@ def run(seed: int) -> None:
         if drawn.what == "twice":
             assert played.state.played or played.state is ExperimentState.BEYOND_BAND
     valve.watch(1.0)
-    assert valve.command_pa() == after_pa, "it stays where it is"
+    if valve.cycle.snapshot.decision.fault is decision.fault:  # none has come after the test
+        assert valve.command_pa() == after_pa, "it stays where it is"
+    if decision.fault is not Fault.NONE and drawn.action != "hold" and drawn.what != "supply":
+        valve.watch(5.0)
+        end_m = 0.0 if drawn.action == "vent" else STROKE_M
+        assert valve.device.stem_m == pytest.approx(end_m, abs=1e-3 * STROKE_M), "as the safety table says"
 
 
 @pytest.mark.parametrize("seed", range(12))

@@ -49,6 +49,9 @@ class Rotary(VirtualValve):
     def stem_m(self) -> float:
         return self.cycle.snapshot.sample.position_m
 
+    def dead_band_pa(self) -> float:
+        return 2.0 * FRICTION_NM / TORQUE_NM_PER_PA
+
     def slope_pa_per_m(self) -> float:
         return degrees(SPRING_PA_PER_DEG)
 
@@ -92,6 +95,7 @@ def test_it_is_commissioned_tested_and_reported_in_degrees_and_newton_metres(
         assert (figures[name]["unit"], figures[name]["value"]) == (unit, pytest.approx(true, rel=within)), name
     main(["pst", str(site), "--keep", "as_left"])
     main(["cst", str(site), "--rate", "0.01", "--keep", "as_left"])
+    main(["steps", str(site), "--held-s", "0.3", "--keep", "as_left"])
     out = tmp_path / "FV-401.html"
     assert main(["report", str(site), "-o", str(out)]) == 0
     seen = capsys.readouterr().out + out.read_text()
