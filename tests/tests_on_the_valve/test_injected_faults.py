@@ -37,7 +37,8 @@ CALM, BY_MODE = "no fault", "another mode"
 DEVICE = ("jump", "nan", "supply", "drift")
 ENDS_AT_PA = {"hold": None, "vent": 0.0, "fill": MAXIMUM_PA}
 """What is commanded after a fault, by `[safety] action`; None: what was commanded before it."""
-TESTS = ("partial", "fast", "continuous", "steps")
+TESTS = ("partial", "fast", "continuous", "steps", "narrow")
+"""Narrow: steps that go farther than their band, and are broken off by it."""
 PEOPLE = ("veto", "no consent", "hold", "nothing", "twice")
 
 
@@ -73,8 +74,9 @@ def asked_of(valve: VirtualValve, drawn: Drawn) -> tuple[Program, float]:
         way = 1 if drawn.opening < 0.5 else -1
         asked = continuous_stroke.ContinuousStroke(rate=5e-3)
         program = continuous_stroke.programme(asked, bounds, start_pa, STROKE_M, way)
-    elif drawn.test == "steps":
-        program = small_steps.programme(small_steps.SmallSteps(840.0 / AREA_M2, 0.4), bounds, start_pa, STROKE_M)
+    elif drawn.test in ("steps", "narrow"):
+        steps = small_steps.SmallSteps(840.0 / AREA_M2, 0.4, most=0.02 if drawn.test == "narrow" else 0.3)
+        program = small_steps.programme(steps, bounds, start_pa, STROKE_M)
     else:
         wanted = partial_stroke.PartialStroke(fast=drawn.test == "fast")
         program = partial_stroke.programme(wanted, bounds, start_pa, valve.device.stem_m, STROKE_M)
@@ -118,7 +120,7 @@ def run(seed: int) -> None:
 
     valve._turn = watched
     played = valve.play(program)
-    speed = (RATE_PA_PER_S if drawn.test in ("fast", "steps") else 140e3 / 60.0) / SLOPE
+    speed = (RATE_PA_PER_S if drawn.test in ("fast", "steps", "narrow") else 140e3 / 60.0) / SLOPE
     lied_m = JUMP_M if drawn.what in ("jump", "drift") else 0.0
     if drawn.what == "supply":  # the air is gone: the spring closes it, whatever is commanded
         lied_m = begun_m
