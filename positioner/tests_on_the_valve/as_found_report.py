@@ -22,14 +22,13 @@ from config.daemon_file import DaemonFile
 from config.results.block import Table, as_text
 from positioner.tests_on_the_valve.kept_records import KINDS, Record, change_table, changes
 from positioner.tests_on_the_valve.outcome import Curve, Picture, Quantity
+from positioner.tests_on_the_valve.thresholds import THRESHOLDS
 
 if TYPE_CHECKING:
     from pathlib import Path
 
 TITLES = {"factory": "factory", "as_found": "as found", "as_left": "as left"}
-OFF = 0.05
-"""Of what is recommended: a figure that is farther from it, and farther than its own ±, is marked."""
-MARK = f"* off what is recommended, by more than {OFF:.0%} and by more than its own ±"
+MARK = f"* off what is recommended, by more than {THRESHOLDS.off:.0%} and by more than its own ±"
 WIDTH, HEIGHT, EDGE = 640, 300, 56
 """Of a picture, in its own units."""
 INKS = {"as_found": ("#d9622b", "#e8a27f"), "as_left": ("#1b7f79", "#7db8b4"), "factory": ("#5b6675", "#9aa4b1")}
@@ -135,7 +134,7 @@ class ValveReport:
         if wanted is None or figure.value is None:
             return quantity.shown
         off = abs(figure.value - wanted)
-        marked = off > OFF * abs(wanted) and off > (figure.plus_minus or 0.0)
+        marked = off > THRESHOLDS.off * abs(wanted) and off > (figure.plus_minus or 0.0)
         return f"{quantity.shown} *" if marked else quantity.shown
 
     def _recommended(self, quantity: Quantity) -> str:

@@ -14,19 +14,7 @@ import numpy as np
 
 from config.recording import Column, Recording
 from positioner.response.figure import Figure, undetermined
-
-HELD_S = 2.0
-"""Before and after, at rest."""
-IN_A_ROW = 3
-"""Samples beyond the tolerance that are a motion."""
-TOLERANCE_SIGMA = 5.0
-"""Deviations of the noise below which no tolerance is."""
-COUNTED = 5
-"""Samples whose median is where the stem is."""
-FEWEST = 8
-"""Samples of a rest."""
-CHANGED = 1e-4
-"""Of the command: a change below it is none."""
+from positioner.tests_on_the_valve.thresholds import THRESHOLDS
 
 
 @dataclass(frozen=True, slots=True)
@@ -58,7 +46,7 @@ class Breakout:
 def rest_before(recording: Recording) -> Rest | None:
     """Return the rest under the first command; None where there are too few samples of it."""
     command = recording.command_pa
-    off = np.flatnonzero(np.abs(command - command[0]) > CHANGED * max(1.0, abs(float(command[0]))))
+    off = np.flatnonzero(np.abs(command - command[0]) > THRESHOLDS.command_changed * max(1.0, abs(float(command[0]))))
     return _rest(recording.time_s, recording.position_m, 0, int(off[0]) if off.size else len(command))
 
 
@@ -66,7 +54,7 @@ def rest_after(recording: Recording) -> Rest | None:
     """Return the rest under the command that is held at the end."""
     command = recording.command_pa
     last = len(command)
-    off = np.flatnonzero(np.abs(command - command[-1]) > CHANGED * max(1.0, abs(float(command[-1]))))
+    off = np.flatnonzero(np.abs(command - command[-1]) > THRESHOLDS.command_changed * max(1.0, abs(float(command[-1]))))
     first = int(off[-1]) + 1 if off.size else 0
     # What is left of the slide back is no rest: its first half is left out.
     return _rest(recording.time_s, recording.position_m, first + (last - first) // 2, last)
@@ -74,7 +62,7 @@ def rest_after(recording: Recording) -> Rest | None:
 
 def tolerance_m(asked_m: float, rest: Rest) -> float:
     """Return the tolerance that is used: what was asked for, or what the noise needs."""
-    return max(asked_m, TOLERANCE_SIGMA * rest.noise_m)
+    return max(asked_m, THRESHOLDS.tolerance_sigmas * rest.noise_m)
 
 
 def breakout(recording: Recording, rest: Rest, tolerance: float) -> Breakout | None:
@@ -82,12 +70,12 @@ def breakout(recording: Recording, rest: Rest, tolerance: float) -> Breakout | N
     off = recording.position_m - rest.position_m
     for way in (1, -1):
         beyond = way * off[rest.rows :] > tolerance
-        if len(beyond) < IN_A_ROW:
+        if len(beyond) < THRESHOLDS.in_a_row:
             return None
-        runs = np.flatnonzero(np.convolve(beyond, np.ones(IN_A_ROW), "valid") >= IN_A_ROW)
+        runs = np.flatnonzero(np.convolve(beyond, np.ones(THRESHOLDS.in_a_row), "valid") >= THRESHOLDS.in_a_row)
         if runs.size:
             row = rest.rows + int(runs[0])
-            before, after = max(rest.rows - 1, row - 1), min(len(off) - 1, row + IN_A_ROW - 1)
+            before, after = max(rest.rows - 1, row - 1), min(len(off) - 1, row + THRESHOLDS.in_a_row - 1)
             spread = abs(float(recording.command_pa[after] - recording.command_pa[before]))
             return Breakout(row, float(recording.time_s[row]), float(recording.command_pa[row]), spread, way)
     return None
@@ -96,16 +84,16 @@ def breakout(recording: Recording, rest: Rest, tolerance: float) -> Breakout | N
 def farthest(recording: Recording, rest: Rest) -> Figure:
     """Return the farthest that the stem went from its rest by the median of a few samples, m."""
     x = recording.position_m
-    if len(x) < COUNTED:
+    if len(x) < THRESHOLDS.counted:
         return undetermined("too few samples")
-    windows = np.lib.stride_tricks.sliding_window_view(x, COUNTED)
+    windows = np.lib.stride_tricks.sliding_window_view(x, THRESHOLDS.counted)
     gone = np.abs(np.median(windows, axis=1) - rest.position_m)
-    return Figure(float(np.max(gone)), 2.0 * 1.25 * rest.noise_m / sqrt(COUNTED))
+    return Figure(float(np.max(gone)), 2.0 * 1.25 * rest.noise_m / sqrt(THRESHOLDS.counted))
 
 
 def _rest(time_s: Column, position_m: Column, first: int, last: int) -> Rest | None:
     x, t = position_m[first:last], time_s[first:last]
-    if len(x) < FEWEST:
+    if len(x) < THRESHOLDS.fewest_at_rest:
         return None
     slope, level = np.polyfit(t - t[0], x, 1)
     noise = float(np.std(x - (slope * (t - t[0]) + level), ddof=2))

@@ -30,29 +30,11 @@ from positioner.response.figure import Figure, undetermined
 from positioner.tests_on_the_valve import signature, small_steps
 from positioner.tests_on_the_valve.outcome import Outcome, Quantity
 from positioner.tests_on_the_valve.program import Bounds, Leap, Played, Player, Program, ramped
+from positioner.tests_on_the_valve.thresholds import THRESHOLDS
 
 TEST = "commissioning"
-WATCHED_S = 3.0
-CREEP_S = 30.0
-"""From the least command to the most, while the direction is sought."""
-SLOW_LEG_S = 20.0
-STROKE_HELD_S = 6.0
-LEAK_S = 12.0
-SETTLING_S = 3.0
-"""Of these, after which the stem rests."""
-MOVED_SIGMA, MOVED_QUANTA, MOVED_LEAST_M = 10.0, 20.0, 1e-4
-"""How far the reading must go to have moved: deviations of its noise, its digits, m."""
-ARRIVED = 0.98
-"""Of the travel: a stroke is over."""
-MARGIN = 0.15
-"""Of the bench set's span, above the command that takes the stem to its upper end: what presses it there."""
-SUPPLY_MARGIN = 0.05
-"""Of the same: with less the supply is hardly enough."""
-ROUNDED_PA = 1000.0
 ANGLE_DIGITS = 3
 """Of degrees: what no transmitter resolves."""
-ZERO_OFF = 0.01
-"""Of the travel: a reading at the closed end that is farther from 0 is off."""
 
 
 class Watching(Player, Protocol):
@@ -121,9 +103,10 @@ def commission(
 
 def _commissioned(valve: Watching, name: str, bounds: Bounds, show: Callable[[str], None]) -> Commissioned:
     show("watching")
-    noise_m, digit_m, creep = _watched(valve.watch(WATCHED_S))
+    noise_m, digit_m, creep = _watched(valve.watch(THRESHOLDS.watched_s))
     start_pa = valve.command_pa()
-    sign = _direction(valve, bounds, start_pa, max(MOVED_SIGMA * noise_m, MOVED_QUANTA * digit_m, MOVED_LEAST_M), show)
+    seen_m = max(THRESHOLDS.seen_sigmas * noise_m, THRESHOLDS.seen_digits * digit_m, THRESHOLDS.seen_m)
+    sign = _direction(valve, bounds, start_pa, seen_m, show)
     recordings = _ramps(valve, bounds, start_pa, sign, show)
     if lacking := signature.supply_lacking(recordings):  # a stem that waits for air looks as one on its stop
         raise _Ended(ValveTestVerdict.NO_SUPPLY, lacking)
@@ -146,7 +129,7 @@ def _commissioned(valve: Watching, name: str, bounds: Bounds, show: Callable[[st
     opening, closing = (up_s, down_s) if sign > 0 else (down_s, up_s)
     closed_m = low.value if sign > 0 else -high.value
     adequate, notes = _supply(found, bounds)
-    if abs(closed_m) > ZERO_OFF * travel.value:
+    if abs(closed_m) > THRESHOLDS.zero_off * travel.value:
         notes.append(
             f"the reading at the closed end is {kind.length.said(closed_m)}: its zero is off, set it in the device"
         )
@@ -181,7 +164,7 @@ LEFT_OUT = frozenset({"low_m", "high_m", "noise_m", "friction_at_rate_pa", "dyna
 
 def _watched(recording: Recording | None) -> tuple[float, float, float]:
     """Return noise, digit and creep of the reading, m."""
-    if recording is None or len(recording) < 8:
+    if recording is None or len(recording) < THRESHOLDS.fewest_at_rest:
         raise _Ended(ValveTestVerdict.UNDETERMINED, "no good measurement: positioner doctor says more")
     x, t = recording.position_m, recording.time_s - recording.time_s[0]
     slope, level = np.polyfit(t, x, 1)
@@ -203,7 +186,7 @@ def _recording_of(played: Played) -> Recording:
 
 def _direction(valve: Watching, bounds: Bounds, start_pa: float, moved_m: float, show: Callable[[str], None]) -> float:
     """Return whether the reading rises, 1, or falls, -1, with the command."""
-    rate = (bounds.maximum_pa - bounds.minimum_pa) / CREEP_S
+    rate = (bounds.maximum_pa - bounds.minimum_pa) / THRESHOLDS.creep_s
     first = 1.0 if start_pa < 0.5 * (bounds.minimum_pa + bounds.maximum_pa) else -1.0
     for way in (first, -first):
         limit_pa = bounds.maximum_pa if way > 0 else bounds.minimum_pa
@@ -224,7 +207,7 @@ def _direction(valve: Watching, bounds: Bounds, start_pa: float, moved_m: float,
 def _ramps(
     valve: Watching, bounds: Bounds, start_pa: float, sign: float, show: Callable[[str], None]
 ) -> list[Recording]:
-    short = replace(bounds, longest_s=min(bounds.longest_s, 4.0 * SLOW_LEG_S / 0.95 + 5.0))
+    short = replace(bounds, longest_s=min(bounds.longest_s, signature.time_limit_s(THRESHOLDS.commissioning_leg_s)))
     slow, _, fast = signature.programmes(short, start_pa)
     return [_mirrored(_played(valve, each, show), sign) for each in (slow, fast)]
 
@@ -236,7 +219,8 @@ def _mirrored(recording: Recording, sign: float) -> Recording:
 
 def _strokes(bounds: Bounds, start_pa: float) -> Program:
     low, high = bounds.minimum_pa, bounds.maximum_pa
-    leaps = (Leap(low, STROKE_HELD_S), Leap(high, STROKE_HELD_S), Leap(low, STROKE_HELD_S), Leap(start_pa, 0.5))
+    held_s = THRESHOLDS.stroke_held_s
+    leaps = (Leap(low, held_s), Leap(high, held_s), Leap(low, held_s), Leap(start_pa, 0.5))
     return ramped("stroke times", start_pa, leaps, bounds.rate_pa_per_s)
 
 
@@ -254,7 +238,7 @@ def _stroke_times(
     if not before_up.size or not after.size:
         lost = undetermined("the command did not stay at its ends")
         return lost, lost
-    level = min(ARRIVED, 1.0 - 3.0 * noise_m / (high - low))
+    level = min(THRESHOLDS.arrived, 1.0 - THRESHOLDS.arrived_sigmas * noise_m / (high - low))
 
     def arrival(first: int, last: int, gone: Column) -> Figure:
         there = np.flatnonzero(gone[first:last] >= level)
@@ -269,7 +253,7 @@ def _stroke_times(
 
 
 def _held(bounds: Bounds, start_pa: float, half_pa: float) -> Program:
-    return ramped("leak", start_pa, (Leap(half_pa, LEAK_S), Leap(start_pa, 0.5)), bounds.rate_pa_per_s)
+    return ramped("leak", start_pa, (Leap(half_pa, THRESHOLDS.leak_s), Leap(start_pa, 0.5)), bounds.rate_pa_per_s)
 
 
 def _leak(recording: Recording, sign: float) -> Figure:
@@ -278,8 +262,8 @@ def _leak(recording: Recording, sign: float) -> Figure:
     held = np.flatnonzero(np.abs(np.diff(p, prepend=p[0])) < 1e-9 * max(1.0, float(np.max(np.abs(p)))))
     runs = np.split(held, np.flatnonzero(np.diff(held) > 1) + 1)
     rows = max(runs, key=len)
-    rows = rows[t[rows] >= t[rows[0]] + SETTLING_S]
-    if len(rows) < 8:
+    rows = rows[t[rows] >= t[rows[0]] + THRESHOLDS.settling_s]
+    if len(rows) < THRESHOLDS.fewest_at_rest:
         return undetermined("too few samples under the command held")
     at_s, x = t[rows] - t[rows[0]], sign * recording.position_m[rows]
     slope, level = np.polyfit(at_s, x, 1)
@@ -318,7 +302,7 @@ def _supply(found: Outcome, bounds: Bounds) -> tuple[Figure, list[str]]:
     margin = (bounds.maximum_pa - high.value - friction.value) / span_pa
     error = hypot(high.plus_minus or 0.0, friction.plus_minus or 0.0) / span_pa
     notes = []
-    if margin < SUPPLY_MARGIN:
+    if margin < THRESHOLDS.supply_margin:
         notes.append("the supply is hardly enough to hold the stem at its upper end")
     return Figure(margin, error), notes
 
@@ -334,8 +318,8 @@ def _proposals(outcome: Outcome, action: ActionWord, bounds: Bounds) -> list[Pro
         ),
     ]
     if high.value is not None and low.value is not None and friction.value is not None:
-        enough_pa = high.value + friction.value + MARGIN * (high.value - low.value)
-        enough_pa = ROUNDED_PA * ceil(enough_pa / ROUNDED_PA)
+        enough_pa = high.value + friction.value + THRESHOLDS.pressed * (high.value - low.value)
+        enough_pa = THRESHOLDS.rounded_pa * ceil(enough_pa / THRESHOLDS.rounded_pa)
         if enough_pa < bounds.maximum_pa:
             why = "takes the stem to its upper end and presses it there by 15 % of the bench set"
             told.append(Proposal("pressure", "maximum_pa", enough_pa, why))

@@ -16,18 +16,16 @@ from config.codes import ExperimentState, ValveTestVerdict
 from config.drive import VALVE, Kind
 from config.errors import InputError
 from positioner.response.figure import Figure, undetermined
-from positioner.tests_on_the_valve.breakout import HELD_S, Breakout, breakout, rest_before, tolerance_m
+from positioner.tests_on_the_valve.breakout import Breakout, breakout, rest_before, tolerance_m
 from positioner.tests_on_the_valve.outcome import Curve, Outcome, Picture, Quantity
 from positioner.tests_on_the_valve.program import Bounds, Leap, Played, Program, ramped
+from positioner.tests_on_the_valve.thresholds import THRESHOLDS
 
 TEST = "continuous stroke test"
 RATE = 5e-4
 """Of the command's range, per second."""
 MOST = 0.02
 """Of the stroke: farther it may not move the stem of a valve in operation."""
-ONE_WAY = 0.45
-"""Of the time limit: forth, and once it has moved, back."""
-SHORTEST_WAY_S = 1.0
 START = 0.003
 """Of the stroke: motion that ends it."""
 
@@ -70,7 +68,7 @@ def programme(
     """
     asked.require_possible()
     rate = asked.rate * (bounds.maximum_pa - bounds.minimum_pa)
-    within_s = max(SHORTEST_WAY_S, ONE_WAY * bounds.longest_s - HELD_S)
+    within_s = max(THRESHOLDS.shortest_way_s, THRESHOLDS.one_way * bounds.longest_s - THRESHOLDS.rest_s)
     farthest_pa = rate * within_s
     if dead_band_pa is not None and farthest_pa < dead_band_pa:
         needed = asked.rate * dead_band_pa / farthest_pa
@@ -82,7 +80,7 @@ def programme(
     limit_pa = (
         min(bounds.maximum_pa, start_pa + farthest_pa) if way > 0 else max(bounds.minimum_pa, start_pa - farthest_pa)
     )
-    leaps = (Leap(start_pa, HELD_S), Leap(limit_pa, 0.0))
+    leaps = (Leap(start_pa, THRESHOLDS.rest_s), Leap(limit_pa, 0.0))
     return ramped(
         f"{TEST}, {'up' if way > 0 else 'down'}",
         start_pa,

@@ -3,7 +3,7 @@
 A record is one JSON file, `STAMP_TEST.json`, in a folder of the valve's own: outcome, picture, what was configured.
 `positioner.history.kept_tests` says where those folders are.
 
-A figure has changed where it is off by more than `CHANGED` of both deviations together, and by `WORTH` of itself:
+A figure has changed where it is off by more than `changed_sigmas` of both deviations together and by `worth` of itself:
 
     d = (now - before) / sqrt(s_now^2 + s_before^2)      s half of each +-
 """
@@ -25,16 +25,12 @@ from config.results.block import Table
 from config.whole_file import replace_whole
 from positioner.response.figure import Figure
 from positioner.tests_on_the_valve.outcome import TURNED, Curve, Outcome, Picture, Quantity
-from positioner.tests_on_the_valve.ramps import SAME_RATE
+from positioner.tests_on_the_valve.thresholds import THRESHOLDS
 
 KINDS = ("factory", "as_found", "as_left")
 """What a record is kept as; the newest of a kind stands for it."""
 BASELINES = ("as_left", "factory")
 """What a test is compared with where nobody says, the first that is there."""
-CHANGED = 4.0
-"""Deviations: of twenty figures one in a thousand comparisons is off by so much without a change."""
-WORTH = 0.02
-"""Of a figure: less than this is no change that anybody acts on, however certain."""
 TREND = 8
 """Records that a trend shows."""
 MOST_POINTS = 600
@@ -84,7 +80,9 @@ class Change:
         now, before = self.quantity.figure.value, self.before.figure.value
         if now is None or before is None:
             return now is not before
-        return abs(self.deviations) > CHANGED and abs(now - before) > WORTH * max(abs(now), abs(before))
+        return abs(self.deviations) > THRESHOLDS.changed_sigmas and abs(now - before) > THRESHOLDS.worth * max(
+            abs(now), abs(before)
+        )
 
     @property
     def means(self) -> str:
@@ -174,7 +172,7 @@ def _rates_differ(*outcomes: Outcome) -> bool:
     """Whether ramps were faster in one: the rate is what the limits of pressure and time permitted."""
     rates = [each.figure.value for outcome in outcomes for each in outcome.quantities if each.name == RATE]
     known = [each for each in rates if each is not None]
-    return len(known) == len(outcomes) and max(known) > (1.0 + SAME_RATE) * min(known)
+    return len(known) == len(outcomes) and max(known) > (1.0 + THRESHOLDS.same_rate) * min(known)
 
 
 def change_table(told: Sequence[Change], since: str) -> Table:

@@ -10,7 +10,7 @@ Abort: beyond the band about the start (travel and `beyond`), by the travel wind
 
     friction high, low      friction over the reference's, beyond `[health] friction_high`, `friction_low`; where either
                             has none, break-out over the reference's, if both began under the same command
-    slow                    time from the break-out to the travel over the reference's, above `SLOW`
+    slow                    time from the break-out to the travel over the reference's, above `slow`
 
 each beyond its own +-. Break-out is counted from the command in force: a stem that is pressed onto its stop needs more.
 """
@@ -26,7 +26,6 @@ from config.errors import InputError
 from config.recording import Recording
 from positioner.response.figure import Figure, undetermined
 from positioner.tests_on_the_valve.breakout import (
-    HELD_S,
     Breakout,
     Rest,
     breakout,
@@ -36,21 +35,10 @@ from positioner.tests_on_the_valve.breakout import (
     tolerance_m,
 )
 from positioner.tests_on_the_valve.outcome import Curve, Outcome, Picture, Quantity
-from positioner.tests_on_the_valve.program import Bounds, Leap, Played, Program, ramped
+from positioner.tests_on_the_valve.program import SHORTEST_S, Bounds, Leap, Played, Program, ramped
+from positioner.tests_on_the_valve.thresholds import THRESHOLDS
 
 TEST = "partial stroke test"
-RAMP_S = 60.0
-"""From the least command to the most, where nobody says how fast."""
-SLOW = 1.5
-"""Of the reference's time to the travel."""
-AT_AN_END = 0.02
-"""Of the stroke: a stem so near an end is pressed onto it, and has to be back there after the test."""
-SAME_COMMAND = 0.02
-"""Of it: commands before two tests that differ by more are not the same."""
-INNER = (0.2, 0.8)
-"""Of the travel, where friction is taken from both ways."""
-FEWEST = 4
-"""Samples of each way for friction."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -115,14 +103,17 @@ def programme(
             f"allowed is beyond the command in force, {start_pa:g} Pa, up to the limit {limit_pa:g} Pa, "
             f"got {threshold_pa:g}",
         )
-    rate = bounds.rate_pa_per_s if asked.fast else (bounds.maximum_pa - bounds.minimum_pa) / RAMP_S
-    spare_s = 2.0 * HELD_S
+    rate = bounds.rate_pa_per_s if asked.fast else (bounds.maximum_pa - bounds.minimum_pa) / THRESHOLDS.slowest_leg_s
+    spare_s = 2.0 * THRESHOLDS.rest_s
     needed_s = abs(threshold_pa - start_pa) / rate + spare_s
     if needed_s > bounds.longest_s:
-        rate = min(bounds.rate_pa_per_s, abs(threshold_pa - start_pa) / max(1e-3, 0.95 * bounds.longest_s - spare_s))
+        rate = min(
+            bounds.rate_pa_per_s,
+            abs(threshold_pa - start_pa) / max(SHORTEST_S, THRESHOLDS.of_time_limit * bounds.longest_s - spare_s),
+        )
     if abs(threshold_pa - start_pa) / rate + spare_s > bounds.longest_s:
         raise InputError(source, f"experiment.limit_s: this test needs {needed_s:.3g} s, got {bounds.longest_s:g}")
-    leaps = (Leap(start_pa, HELD_S), Leap(threshold_pa, 0.0))
+    leaps = (Leap(start_pa, THRESHOLDS.rest_s), Leap(threshold_pa, 0.0))
     turn_m = asked.travel * stroke_m
     return ramped(TEST, start_pa, leaps, rate, turn_m=turn_m, band_m=turn_m + asked.beyond * stroke_m)
 
@@ -207,7 +198,7 @@ def _verdicts(
         yield ValveTestVerdict.TRAVEL_NOT_REACHED
     if travel.value is not None and travel.value > (asked.travel + asked.beyond) * stroke_m:
         yield ValveTestVerdict.TRAVEL_EXCEEDED
-    at_an_end = not AT_AN_END * stroke_m < rest.position_m < (1.0 - AT_AN_END) * stroke_m
+    at_an_end = not THRESHOLDS.at_an_end * stroke_m < rest.position_m < (1.0 - THRESHOLDS.at_an_end) * stroke_m
     if at_an_end and after is not None and abs(after.position_m - rest.position_m) > tolerance:
         yield ValveTestVerdict.NOT_SEATED
 
@@ -267,10 +258,10 @@ def _friction(recording: Recording, rest: Rest, travel: Figure, state: Experimen
         return undetermined("the stem was not moved there and back")
     p, gone = recording.command_pa, np.abs(recording.position_m - rest.position_m)
     turn = int(np.argmax(np.abs(p - p[0])))
-    inside = (gone > INNER[0] * travel.value) & (gone < INNER[1] * travel.value)
+    inside = (gone > THRESHOLDS.inner_partial[0] * travel.value) & (gone < THRESHOLDS.inner_partial[1] * travel.value)
     rows = np.arange(len(p))
     ways = [p[inside & (rows <= turn) & (rows >= rest.rows)], p[inside & (rows > turn)]]
-    if min(map(len, ways)) < FEWEST:
+    if min(map(len, ways)) < THRESHOLDS.fewest_in_bin:
         return undetermined("too few samples of both ways: a slower ramp has more")
     apart = abs(float(np.mean(ways[0]) - np.mean(ways[1])))
     error = sqrt(sum(float(np.var(each, ddof=1)) / len(each) for each in ways))
@@ -289,7 +280,7 @@ def _against(now: dict[str, Figure], reference: Outcome, limits: tuple[float, fl
         if low and figure.value + (figure.plus_minus or 0.0) < low * was:
             yield ValveTestVerdict.FRICTION_LOW
     figure, was = now["stroke_s"], then.get("stroke_s", undetermined("")).value
-    if figure.value is not None and was and figure.value - (figure.plus_minus or 0.0) > SLOW * was:
+    if figure.value is not None and was and figure.value - (figure.plus_minus or 0.0) > THRESHOLDS.slow * was:
         yield ValveTestVerdict.SLOW
 
 
@@ -303,7 +294,7 @@ def _judged(now: dict[str, Figure], then: dict[str, Figure]) -> Iterator[str]:
         yield "friction_at_rate_pa"
     elif both("breakout_pa") and both("command_pa"):
         before, after = then["command_pa"].value or 0.0, now["command_pa"].value or 0.0
-        if abs(after - before) <= SAME_COMMAND * max(abs(before), abs(after)):
+        if abs(after - before) <= THRESHOLDS.same_command * max(abs(before), abs(after)):
             yield "breakout_pa"
 
 

@@ -26,29 +26,7 @@ from numpy.typing import NDArray
 
 from config.recording import Column, Recording
 from positioner.response.figure import Figure, undetermined
-
-LEG_SPAN = 0.6
-"""Of what the command spans in the record: what goes one way for less is no leg."""
-INNER = (0.1, 0.9)
-"""Of the travel, where the spring rate is taken."""
-BEYOND = 0.03
-"""Of the commands that move the stem: so far beyond the bend it lies at its end."""
-FEWEST = 5
-"""Samples at an end, or in a bin: of fewer no level is taken."""
-FEWEST_MOVING = 12
-"""Samples between 10 and 90 %: of fewer no line is taken."""
-BINS = 40
-"""Of a leg, in which the position is averaged for the first guess."""
-PASSES = 6
-"""Of the choice of rows: each takes them by the line before."""
-SAME_RATE = 0.1
-"""Rates that differ by less are one."""
-TWO_SIGMA = 2.0
-"""Every +- here is two standard deviations."""
-HELD = 0.1
-"""Of how far the command goes from sample to sample: what no line is better than, for it is held between them."""
-MOVED = 5.0
-"""Deviations of the noise beyond which a leg has moved the stem."""
+from positioner.tests_on_the_valve.thresholds import THRESHOLDS
 
 
 @dataclass(frozen=True, slots=True)
@@ -110,23 +88,23 @@ class Ramps:
         rates, pressures, deviations = self._at(way, position_m)
         if not rates:
             return undetermined(_no_line(way))
-        if max(rates) - min(rates) < SAME_RATE * max(rates):
+        if max(rates) - min(rates) < THRESHOLDS.same_rate * max(rates):
             return undetermined("ramps of one rate alone: lag would count as friction")
         weights = 1.0 / deviations
         matrix = np.column_stack([np.ones(len(rates)), rates]) * weights[:, None]
         solved = np.linalg.lstsq(matrix, pressures * weights)[0]
         covariance = np.linalg.inv(matrix.T @ matrix)
-        return Figure(float(solved[0]), TWO_SIGMA * sqrt(float(covariance[0, 0])))
+        return Figure(float(solved[0]), THRESHOLDS.sigmas * sqrt(float(covariance[0, 0])))
 
     def at_slowest(self, way: int, position_m: float) -> Figure:
         """Return the same at the slowest rate that was played, lag and all, Pa."""
         rates, pressures, deviations = self._at(way, position_m)
         if not rates:
             return undetermined(_no_line(way))
-        slow = [n for n, rate in enumerate(rates) if rate < (1.0 + SAME_RATE) * min(rates)]
+        slow = [n for n, rate in enumerate(rates) if rate < (1.0 + THRESHOLDS.same_rate) * min(rates)]
         weights = 1.0 / deviations[slow] ** 2
         mean = float(np.sum(weights * pressures[slow]) / np.sum(weights))
-        return Figure(mean, TWO_SIGMA / sqrt(float(np.sum(weights))))
+        return Figure(mean, THRESHOLDS.sigmas / sqrt(float(np.sum(weights))))
 
     def slope_pa_per_m(self) -> Figure:
         """Return the spring rate over the area, Pa/m: mean of all lines, which lag does not turn."""
@@ -138,14 +116,14 @@ class Ramps:
         mean = float(np.sum(weights * slopes) / np.sum(weights))
         own = 1.0 / sqrt(float(np.sum(weights)))
         spread = float(np.sqrt(np.sum(weights * (slopes - mean) ** 2) / np.sum(weights) / max(1, len(slopes) - 1)))
-        return Figure(mean, TWO_SIGMA * max(own, spread))
+        return Figure(mean, THRESHOLDS.sigmas * max(own, spread))
 
     @property
     def rates_pa_per_s(self) -> tuple[float, ...]:
         """The rates that were played, slowest first, like ones once."""
         told: list[float] = []
         for rate in sorted(each.leg.rate_pa_per_s for each in self.lines):
-            if not told or rate > (1.0 + SAME_RATE) * told[-1]:
+            if not told or rate > (1.0 + THRESHOLDS.same_rate) * told[-1]:
                 told.append(rate)
         return tuple(told)
 
@@ -154,7 +132,7 @@ class Ramps:
         lines = [each for each in self.lines if each.leg.way == way]
         if not lines:
             return []
-        limit = (1.0 + SAME_RATE) * min(each.leg.rate_pa_per_s for each in lines)
+        limit = (1.0 + THRESHOLDS.same_rate) * min(each.leg.rate_pa_per_s for each in lines)
         return [each for each in lines if each.leg.rate_pa_per_s < limit]
 
     def _at(self, way: int, position_m: float) -> tuple[list[float], Column, Column]:
@@ -163,7 +141,7 @@ class Ramps:
         return (
             [each.leg.rate_pa_per_s for each in lines],
             np.array([pressure_pa for pressure_pa, _ in told]),
-            np.array([hypot(std, HELD * each.held_pa) for (_, std), each in zip(told, lines, strict=True)]),
+            np.array([hypot(std, THRESHOLDS.held * each.held_pa) for (_, std), each in zip(told, lines, strict=True)]),
         )
 
 
@@ -190,13 +168,13 @@ def legs_of(recording: Recording) -> list[Leg]:
     whole = np.isfinite(recording.position_m) & np.isfinite(recording.command_pa)
     time_s, command_pa = recording.time_s[whole], recording.command_pa[whole]
     position_m = recording.position_m[whole]
-    if len(time_s) < FEWEST_MOVING:
+    if len(time_s) < THRESHOLDS.fewest_moving:
         return []
     span_pa = float(np.ptp(command_pa))
     found = []
     for first, last in _one_way(command_pa, 1e-3 * span_pa):
         risen_pa = float(command_pa[last] - command_pa[first])
-        if abs(risen_pa) < LEG_SPAN * span_pa or span_pa == 0.0:
+        if abs(risen_pa) < THRESHOLDS.leg_span * span_pa or span_pa == 0.0:
             continue
         rows = slice(first, last + 1)
         rate = abs(risen_pa) / float(time_s[last] - time_s[first])
@@ -249,26 +227,30 @@ def _begin(command: Column, first: int, way: int) -> int:
 
 
 def _line(leg: Leg) -> Line | None:
-    levels = [float(np.mean(each)) for each in np.array_split(leg.position_m, min(BINS, len(leg.position_m)))]
+    levels = [
+        float(np.mean(each)) for each in np.array_split(leg.position_m, min(THRESHOLDS.bins, len(leg.position_m)))
+    ]
     low, high = min(levels), max(levels)
     noise = float(np.std(np.diff(leg.position_m))) / sqrt(2.0)
     per_bin = len(leg.position_m) / len(levels)
-    if high - low < MOVED * noise / sqrt(per_bin) + 1e-12 or (levels[-1] - levels[0]) * leg.way <= 0.5 * (high - low):
+    if high - low < THRESHOLDS.moved_sigmas * noise / sqrt(per_bin) + 1e-12 or (
+        levels[-1] - levels[0]
+    ) * leg.way <= 0.5 * (high - low):
         return None
-    inner = (low + INNER[0] * (high - low), low + INNER[1] * (high - low))
+    inner = (low + THRESHOLDS.inner[0] * (high - low), low + THRESHOLDS.inner[1] * (high - low))
     pressures = np.array([float(np.mean(each)) for each in np.array_split(leg.command_pa, len(levels))])
     order = np.argsort(pressures)
     at = [float(np.interp(each, np.maximum.accumulate(np.array(levels)[order]), pressures[order])) for each in inner]
     found: Line | None = None
-    for _ in range(PASSES):
+    for _ in range(THRESHOLDS.passes):
         rows = (leg.command_pa >= at[0]) & (leg.command_pa <= at[1])
-        if int(rows.sum()) < FEWEST_MOVING:
+        if int(rows.sum()) < THRESHOLDS.fewest_moving:
             return found
         found = _fitted(leg, rows)
         if found is None:
             return None
         low, high = _levels(found, low, high)
-        at = [found.pressure_pa(low + share * (high - low))[0] for share in INNER]
+        at = [found.pressure_pa(low + share * (high - low))[0] for share in THRESHOLDS.inner]
     return found
 
 
@@ -310,17 +292,18 @@ there, m, or None; their scatter, m; how many."""
 
 def _at_ends(line: Line, near: tuple[float, float] | None = None) -> tuple[End, End]:
     x, p = line.leg.position_m, line.leg.command_pa
-    low, high = near or (float(np.quantile(x, 0.02)), float(np.quantile(x, 0.98)))
+    low, high = near or np.quantile(x, THRESHOLDS.end_quantiles).tolist()
     first, last = line.pressure_pa(low)[0], line.pressure_pa(high)[0]
-    margin = BEYOND * (last - first)
+    margin = THRESHOLDS.beyond * (last - first)
     found: list[End] = []
     for rows, guess, way in ((p < first - margin, low, -1), (p > last + margin, high, 1)):
         at = x[rows]
-        if len(at) < FEWEST or way != line.leg.way:
+        if len(at) < THRESHOLDS.fewest_in_bin or way != line.leg.way:
             found.append((None, 0.0, 0))
         else:
             level = float(np.mean(at)) if near else float(np.median(at))
-            found.append((level if abs(level - guess) < 0.1 * (high - low) else None, float(np.std(at)), len(at)))
+            agrees = abs(level - guess) < THRESHOLDS.end_agrees * (high - low)
+            found.append((level if agrees else None, float(np.std(at)), len(at)))
     return found[0], found[1]
 
 
@@ -333,4 +316,4 @@ def _end(seen: Sequence[End], which: str) -> Figure:
     middle = float(np.sum(counts * levels) / np.sum(counts))
     own = sqrt(sum(count * scatter**2 for _, scatter, count in told)) / float(np.sum(counts))
     spread = float(np.std(levels, ddof=1)) / sqrt(len(levels)) if len(levels) > 1 else 0.0
-    return Figure(middle, TWO_SIGMA * max(own, spread))
+    return Figure(middle, THRESHOLDS.sigmas * max(own, spread))

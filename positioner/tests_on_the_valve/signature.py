@@ -33,31 +33,12 @@ from config.results.block import Table
 from positioner.response.figure import Figure, undetermined
 from positioner.tests_on_the_valve.outcome import Curve, Outcome, Picture, Quantity
 from positioner.tests_on_the_valve.program import Bounds, Leap, Program, ramped
-from positioner.tests_on_the_valve.ramps import (
-    FEWEST,
-    TWO_SIGMA,
-    Leg,
-    Line,
-    Ramps,
-    difference,
-    legs_of,
-    mean,
-    ramps_of,
-)
+from positioner.tests_on_the_valve.ramps import Leg, Line, Ramps, difference, legs_of, mean, ramps_of
+from positioner.tests_on_the_valve.thresholds import THRESHOLDS
 
-RATIO = 4.0
-"""Of the fast rate to the slow one: taken to no rate, the slow ramp's error grows by 4/3 only."""
-HELD_S = 1.0
-"""At each end, for the stem to come to rest."""
-SLOWEST_LEG_S = 60.0
-"""Slower than this a ramp adds time and no precision: the stem sticks and slips."""
-SHORTEST_LEG_S = 5.0
-"""Faster than this no ramp is slow."""
+LEGS = 4
+"""From the command in force to the least one, up, down, and back."""
 DECILES = tuple(0.1 * each for each in range(1, 10))
-STROKE_WRONG = 0.05
-"""Of the stroke: a travel farther from it is another stroke than the file says."""
-SUPPLY_LACKING = 0.05
-"""Of the commands' span: a measured pressure farther from the command at its extremes is no supply, or no I/P."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -81,23 +62,28 @@ def programmes(bounds: Bounds, start_pa: float, source: str = "experiment") -> t
     Raises:
         InputError: the time limit leaves no time for slow ramps; names the source.
     """
-    span_pa = bounds.maximum_pa - bounds.minimum_pa
-    spare_s = 5.0 * HELD_S
-    slow_s = min(SLOWEST_LEG_S, 0.95 * (bounds.longest_s - spare_s) / 4.0)
-    if slow_s < max(SHORTEST_LEG_S, RATIO * span_pa / bounds.rate_pa_per_s):
-        least_s = 4.0 * max(SHORTEST_LEG_S, RATIO * span_pa / bounds.rate_pa_per_s) / 0.95 + spare_s
+    span_pa, held_s = bounds.maximum_pa - bounds.minimum_pa, THRESHOLDS.end_held_s
+    slow_s = min(THRESHOLDS.slowest_leg_s, _leg_s(bounds.longest_s))
+    shortest_s = max(THRESHOLDS.shortest_leg_s, THRESHOLDS.rate_ratio * span_pa / bounds.rate_pa_per_s)
+    if slow_s < shortest_s:
+        least_s = time_limit_s(shortest_s)
         raise InputError(
             source, f"experiment.limit_s: a signature needs {least_s:.3g} s or more, got {bounds.longest_s:g}"
         )
-    fast_s = max(slow_s / RATIO, span_pa / bounds.rate_pa_per_s)
-    lowest, highest = bounds.minimum_pa, bounds.maximum_pa
-    slow, fast = span_pa / slow_s, span_pa / fast_s
-    up_and_down = (Leap(highest, HELD_S), Leap(lowest, HELD_S))
-    return (
-        ramped("slow ramps", start_pa, (Leap(lowest, HELD_S), *up_and_down, Leap(start_pa, HELD_S)), slow),
-        ramped("slow ramps", start_pa, (Leap(lowest, HELD_S), *up_and_down, Leap(start_pa, HELD_S)), slow),
-        ramped("fast ramps", start_pa, (Leap(lowest, HELD_S), *2 * up_and_down, Leap(start_pa, HELD_S)), fast),
-    )
+    fast_s = max(slow_s / THRESHOLDS.rate_ratio, span_pa / bounds.rate_pa_per_s)
+    first, last = Leap(bounds.minimum_pa, held_s), Leap(start_pa, held_s)
+    up_and_down = (Leap(bounds.maximum_pa, held_s), first)
+    slow = ramped("slow ramps", start_pa, (first, *up_and_down, last), span_pa / slow_s)
+    return slow, slow, ramped("fast ramps", start_pa, (first, *2 * up_and_down, last), span_pa / fast_s)
+
+
+def time_limit_s(leg_s: float) -> float:
+    """Return the time limit within which slow ramps take so long a leg, s."""
+    return LEGS * leg_s / THRESHOLDS.of_time_limit + (LEGS + 1) * THRESHOLDS.end_held_s
+
+
+def _leg_s(limit_s: float) -> float:
+    return THRESHOLDS.of_time_limit * (limit_s - (LEGS + 1) * THRESHOLDS.end_held_s) / LEGS
 
 
 def signature(recordings: "list[Recording]", plate: Nameplate) -> Outcome:
@@ -155,7 +141,7 @@ def supply_lacking(recordings: "Sequence[Recording]") -> str:
         command_pa = each.command_pa
         high = command_pa >= np.nanmax(command_pa) - 1e-3 * np.ptp(command_pa)
         reached, asked = float(np.nanmax(pressure_pa[high])), float(np.nanmax(command_pa))
-        if asked - reached > SUPPLY_LACKING * float(np.ptp(command_pa)):
+        if asked - reached > THRESHOLDS.supply_lacking * float(np.ptp(command_pa)):
             return f"the pressure stays at {1e-3 * reached:.4g} kPa where {1e-3 * asked:.4g} kPa is commanded"
     return ""
 
@@ -164,7 +150,7 @@ def _verdict(travel: Figure, plate: Nameplate) -> tuple[tuple[ValveTestVerdict, 
     if travel.value is None:
         return (ValveTestVerdict.UNDETERMINED,), ["the ramps did not take the stem from end to end"]
     off_m = abs(travel.value - plate.stroke_m)
-    if off_m > max(STROKE_WRONG * plate.stroke_m, travel.plus_minus or 0.0):
+    if off_m > max(THRESHOLDS.stroke_wrong * plate.stroke_m, travel.plus_minus or 0.0):
         told = (
             f"the file says {plate.kind.length.said(plate.stroke_m, '.4g')}, the stem travels "
             f"{plate.kind.length.said(travel.value, '.4g')}: one of them is wrong"
@@ -263,14 +249,17 @@ def _bands(ramps: Ramps, x_0: float, x_1: float) -> list[Quantity]:
     if len(centres):
         band = (down - up) / (x_1 - x_0)
         at = int(np.argmax(band))
-        largest = Figure(float(band[at]), TWO_SIGMA * sqrt(2.0) * float(error[at]) / (x_1 - x_0))
+        largest = Figure(float(band[at]), THRESHOLDS.sigmas * sqrt(2.0) * float(error[at]) / (x_1 - x_0))
         average = Figure(
-            float(np.mean(band)), TWO_SIGMA * sqrt(2.0) * float(np.sqrt(np.mean(error**2) / len(band))) / (x_1 - x_0)
+            float(np.mean(band)),
+            THRESHOLDS.sigmas * sqrt(2.0) * float(np.sqrt(np.mean(error**2) / len(band))) / (x_1 - x_0),
         )
         middle = 0.5 * (up + down)
         off = middle - np.polyval(np.polyfit(centres, middle, 1), centres)
         at = int(np.argmax(np.abs(off)))
-        linear = Figure(float(abs(off[at])) / (x_1 - x_0), TWO_SIGMA * float(error[at]) / sqrt(2.0) / (x_1 - x_0))
+        linear = Figure(
+            float(abs(off[at])) / (x_1 - x_0), THRESHOLDS.sigmas * float(error[at]) / sqrt(2.0) / (x_1 - x_0)
+        )
     return [
         Quantity("hysteresis", "hysteresis and dead band, of the span", "1", hysteresis),
         Quantity("dynamic_error_band", "dynamic error band at the slowest rate, largest", "1", largest),
@@ -285,8 +274,8 @@ def _averaged(ramps: Ramps, x_0: float, x_1: float) -> tuple[Column, Column, Col
     nothing = np.array([])
     if not up or not down:
         return nothing, nothing, nothing, nothing
-    first = max(each.pressure_pa(x_0 + 0.05 * (x_1 - x_0))[0] for each in (*up, *down))
-    last = min(each.pressure_pa(x_0 + 0.95 * (x_1 - x_0))[0] for each in (*up, *down))
+    first = max(each.pressure_pa(x_0 + THRESHOLDS.band_edge * (x_1 - x_0))[0] for each in (*up, *down))
+    last = min(each.pressure_pa(x_1 - THRESHOLDS.band_edge * (x_1 - x_0))[0] for each in (*up, *down))
     if last <= first:
         return nothing, nothing, nothing, nothing
     edges = np.linspace(first, last, 11)
@@ -305,7 +294,7 @@ def _in_bins(lines: list[Line], edges: Column) -> tuple[Column, Column]:
     level, error = np.full(len(edges) - 1, np.nan), np.full(len(edges) - 1, np.nan)
     for number, (low, high) in enumerate(pairwise(edges.tolist())):
         rows = (p >= low) & (p < high)
-        if int(rows.sum()) >= FEWEST:
+        if int(rows.sum()) >= THRESHOLDS.fewest_in_bin:
             evened = x[rows] - slope * (p[rows] - 0.5 * (low + high))
             level[number] = float(np.mean(evened))
             error[number] = float(np.std(evened, ddof=1)) / sqrt(int(rows.sum()))
@@ -337,7 +326,7 @@ def _friction_at(ramps: Ramps, middle_m: float, width_m: float, lag_pa: float) -
             p, x = line.leg.command_pa, line.leg.position_m
             low, high = (line.pressure_pa(middle_m + share * width_m)[0] for share in (-0.5, 0.5))
             rows = (p >= low) & (p <= high)
-            if int(rows.sum()) >= FEWEST:
+            if int(rows.sum()) >= THRESHOLDS.fewest_in_bin:
                 needed = p[rows] - (x[rows] - middle_m) / line.slope
                 means.append(float(np.mean(needed)))
                 variances.append(float(np.var(needed, ddof=1)) / int(rows.sum()))
@@ -345,7 +334,7 @@ def _friction_at(ramps: Ramps, middle_m: float, width_m: float, lag_pa: float) -
             return undetermined("too few samples there")
         told[way] = (float(np.mean(means)), sqrt(sum(variances)) / len(variances))
     value = 0.5 * (told[1][0] - told[-1][0]) - lag_pa
-    return Figure(value, TWO_SIGMA * 0.5 * hypot(told[1][1], told[-1][1]))
+    return Figure(value, THRESHOLDS.sigmas * 0.5 * hypot(told[1][1], told[-1][1]))
 
 
 def _picture(ramps: Ramps, kind: Kind) -> Picture:
@@ -358,7 +347,10 @@ def _picture(ramps: Ramps, kind: Kind) -> Picture:
     for way, name in ((1, "line up"), (-1, "line down")):
         for line in ramps.slowest(way)[:1]:
             p = np.array([np.min(line.leg.command_pa), np.max(line.leg.command_pa)])
-            x = np.clip(line.slope * p + line.level, *np.quantile(line.leg.position_m, (0.02, 0.98)))
+            x = np.clip(
+                line.slope * p + line.level,
+                *np.quantile(line.leg.position_m, THRESHOLDS.end_quantiles),
+            )
             ends = (x - line.level) / line.slope
             curves.append(Curve(name, ends, x))
     return Picture.of_travel(kind, curves)

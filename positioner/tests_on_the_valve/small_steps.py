@@ -20,14 +20,9 @@ from positioner.response.figure import Figure, undetermined
 from positioner.response.response_figures import respond
 from positioner.tests_on_the_valve.outcome import Curve, Outcome, Picture, Quantity
 from positioner.tests_on_the_valve.program import Bounds, Leap, Program, ramped
+from positioner.tests_on_the_valve.thresholds import THRESHOLDS
 
 TEST = "step test"
-PARTS, FINE = 10, 50
-"""Steps that a dead band as expected takes: back, and onward, where less moves the stem."""
-ON = 1.3
-"""Of the dead band: the leap that moves the stem for sure."""
-SAME_WAY, BACK = 14, 15
-"""Steps onward, and back: half as much again as a dead band as expected."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -62,17 +57,17 @@ def programme(
         InputError: the limits of time or pressure leave no room.
     """
     asked.require_possible()
-    back_pa, onward_pa = asked.dead_band_pa / PARTS, asked.dead_band_pa / FINE
-    room_pa = (ON + SAME_WAY / FINE) * asked.dead_band_pa
+    back_pa, onward_pa = asked.dead_band_pa / THRESHOLDS.back_parts, asked.dead_band_pa / THRESHOLDS.onward_parts
+    room_pa = (THRESHOLDS.leap + THRESHOLDS.onward_steps / THRESHOLDS.onward_parts) * asked.dead_band_pa
     way = 1.0 if start_pa + room_pa <= bounds.maximum_pa else -1.0
     if not bounds.minimum_pa <= start_pa + way * room_pa <= bounds.maximum_pa:
         raise InputError("--dead-band-pa", f"no room for {room_pa:.3g} Pa either way of the command, {start_pa:.6g} Pa")
-    at_pa = start_pa + way * ON * asked.dead_band_pa
+    at_pa = start_pa + way * THRESHOLDS.leap * asked.dead_band_pa
     levels = [at_pa]
     for direction in (way, -way):
-        for _ in range(SAME_WAY):
+        for _ in range(THRESHOLDS.onward_steps):
             levels.append(levels[-1] + direction * onward_pa)
-        for _ in range(BACK):
+        for _ in range(THRESHOLDS.back_steps):
             levels.append(levels[-1] - direction * back_pa)
     kept = [min(max(each, bounds.minimum_pa), bounds.maximum_pa) for each in levels]
     leaps = (Leap(start_pa, 2.0 * asked.held_s), *(Leap(each, asked.held_s) for each in kept), Leap(start_pa, 0.0))
