@@ -46,7 +46,8 @@ def run(arguments: argparse.Namespace) -> int:
     well = _passes("packages", "", _packages)
     for file in files:
         travel = file.valve.travel
-        print(f"{'config':12} ok    {path}: {file.valve.name}, stroke {travel.stroke_m:g} m, {travel.words}")
+        stroke = file.valve.plain.said(travel.stroke_m, "g")
+        print(f"{'config':12} ok    {path}: {file.valve.name}, stroke {stroke}, {travel.words}")
     nudge_pa: float | None = arguments.nudge_pa
     nudged = () if nudge_pa is None else (("sampling", partial(_sampling, nudge_pa)),)
     checks: list[tuple[str, Check, DaemonFile]] = [

@@ -68,12 +68,12 @@ class Site(NamedTuple):
 
 
 @contextmanager
-def running(folder: Path, device: int) -> Iterator[Site]:
-    config = folder / "site.toml"
-    config.write_text(SITE.replace("DEVICE", str(device)).replace("SERVED", "0"))
+def running(folder: Path, device: int, more: str = "") -> Iterator[Site]:
+    config, text = folder / "site.toml", SITE.replace("DEVICE", str(device)) + more
+    config.write_text(text.replace("SERVED", "0"))
     with child("run", config) as (daemon, serving):
         site = Site(config, daemon, port_in(serving))
-        config.write_text(SITE.replace("DEVICE", str(device)).replace("SERVED", str(site.port)))
+        config.write_text(text.replace("SERVED", str(site.port)))
         yield site
 
 
