@@ -95,7 +95,7 @@ class Loop:
             self._ask(eta=(0, 0, 0))
             for _ in range(round(file.excitation.staircase_limit_s / period_s)):
                 self.cycle.once()
-                if self.cycle.snapshot.decision.estimates.progress >= 1:
+                if self.cycle.snapshot.decision.progress >= 1:
                     break
             self._ask(eta=QUIET)
         self.stand(period_s)

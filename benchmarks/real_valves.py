@@ -212,7 +212,7 @@ class Loop:
         self.ask(eta=(0, 0, 0))
         self.cycle.once()
         until_s = self.time_s + S3_LIMIT_S
-        while self.decision.estimates.progress < 1 and self.time_s < until_s:
+        while self.decision.progress < 1 and self.time_s < until_s:
             self.cycle.once()
             if self.decision.state.name != "S3_IDENTIFY":
                 break

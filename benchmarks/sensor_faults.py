@@ -148,7 +148,7 @@ def identified(each: Experiment, fault: SensorFault, seed: int) -> tuple[Decisio
         while cycle.snapshot.sample.now_s < until_s:
             cycle.once()
             decision = cycle.snapshot.decision
-            if decision.estimates.progress >= 1 or decision.fault or decision.inhibit_reason in GAVE_UP:
+            if decision.progress >= 1 or decision.fault or decision.inhibit_reason in GAVE_UP:
                 return True
         return False
 

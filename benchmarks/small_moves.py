@@ -184,7 +184,7 @@ class Loop:
     def _identify(self, *, by_slides: bool) -> None:
         self._ask(eta=(0, 0, 0))
         if by_slides:
-            while self.cycle.snapshot.decision.estimates.progress < 1:
+            while self.cycle.snapshot.decision.progress < 1:
                 self.cycle.once()
         else:
             self.path(S3_S)

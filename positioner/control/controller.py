@@ -6,7 +6,7 @@
 too, and what is to be refined is left in the memory for `Controller`, which keeps the memory from step to step.
 """
 
-from dataclasses import replace
+from dataclasses import dataclass, replace
 from math import isfinite
 from operator import is_
 from typing import NamedTuple
@@ -37,7 +37,7 @@ from positioner.control.controller_memory import (
     memory_of,
 )
 from positioner.control.excitation import NOTHING, ActiveExcitation, climbed, excitation_after
-from positioner.control.identifying import estimates_tested, identify
+from positioner.control.identifying import identify, progress_of
 from positioner.control.laws.boundary import Law, Seen, seen_of
 from positioner.control.monitors import MonitorMemory, Needs, after_cycle, needs_of
 from positioner.control.played_experiment import PlayedExperiment, Surroundings, experiment_after
@@ -150,6 +150,7 @@ def first_memory(settings: Settings, held_pa: float, restored: ValveKnowledge | 
         delta_r_m=reference.delta_m,
         sample_age_s=0.0,
         estimates=identification.estimates,
+        progress=identification.estimates.progress,
         applied=settings.applied if restored is None else Applied(restored.ratios),
         static_law=statics.law,
         restoration=Restoration.of(restored, settings.valve),
@@ -179,8 +180,9 @@ def first_memory(settings: Settings, held_pa: float, restored: ValveKnowledge | 
     )
 
 
-class Now(NamedTuple):
-    """What one step is decided from."""
+@dataclass(slots=True)
+class Now:
+    """What one step is decided from: a class with slots, for it is made once and read some sixty times."""
 
     memory: ControllerMemory
     sample: Sample
@@ -278,7 +280,8 @@ def step(
         reference_m=reference.value_m,
         delta_r_m=reference.delta_m,
         sample_age_s=0.0 if now.stem_m is not None else sample.now_s - supervision.good_s,
-        estimates=estimates_tested(excitation, memory.identification, memory.statics),
+        estimates=memory.statics.tested(memory.identification.estimates),
+        progress=progress_of(excitation, memory.identification.estimates),
         applied=applied,
         static_law=memory.statics.law,
         restoration=restoration,

@@ -36,6 +36,8 @@ class Decision(NamedTuple):
     delta_r_m: float
     sample_age_s: float
     estimates: Estimates
+    progress: float
+    """Of an identification, 0 to 1."""
     applied: Applied
     static_law: StaticLaw
     restoration: Restoration

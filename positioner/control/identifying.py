@@ -10,8 +10,6 @@ A staircase identifies by its landings alone. What it found is judged in the cyc
 The other estimators have no say in that, nor later: without an excitation they learn from ordinary moves, move by move.
 """
 
-from dataclasses import replace
-
 from config.codes import Refusal
 from positioner.control.controller_memory import ControllerMemory
 from positioner.control.excitation import ActiveExcitation
@@ -20,8 +18,6 @@ from positioner.control.sample import Sample
 from positioner.control.staircase_excitation import Staircase
 from positioner.estimation.acceptance import Applied, accept
 from positioner.estimation.estimates import Estimates
-from positioner.estimation.landings.static_identification import StaticIdentification
-from positioner.estimation.online import Identification
 from positioner.estimation.refiner import Refinement
 
 
@@ -113,11 +109,8 @@ def _concluded(memory: ControllerMemory, *, broken_off: bool) -> Applied:
     return memory.statics.accepted(memory.last.applied)
 
 
-def estimates_tested(
-    excitation: ActiveExcitation | None, identification: Identification, statics: StaticIdentification
-) -> Estimates:
-    """Return the estimates as tested on the landings; the progress of a staircase is its own."""
-    estimates = statics.tested(identification.estimates)
+def progress_of(excitation: ActiveExcitation | None, estimates: Estimates) -> float:
+    """Return how far an identification has come, 0 to 1: of a staircase its own progress, else of the window."""
     if excitation is None or not isinstance(excitation.signal, Staircase):
-        return estimates
-    return replace(estimates, progress=excitation.signal.progress)
+        return estimates.progress
+    return excitation.signal.progress

@@ -344,7 +344,7 @@ def _status_getters(cycle: Cycle, travel: Travel) -> dict[str, Getter]:
 
 def _estimate_getters(stroke_m: float) -> dict[str, Getter]:
     getters: dict[str, Getter] = {
-        "progress": lambda s, _: s.decision.estimates.progress,
+        "progress": lambda s, _: s.decision.progress,
         "estimate_age": lambda s, _: s.sample.time_s - s.decision.estimates.time_s,
         "b_over_c_applied": lambda s, _: r.b_over_c if (r := s.decision.applied.ratios) else math.nan,
         "k_over_c_applied": lambda s, _: r.k_over_c if (r := s.decision.applied.ratios) else math.nan,

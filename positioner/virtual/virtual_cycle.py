@@ -70,7 +70,7 @@ def identified(cycle: Cycle, within_s: float, *, wait: bool) -> Iterator[Snapsho
     """
 
     def ask(snapshot: Snapshot, requests: Requests) -> Requests:
-        return replace(requests, eta=QUIET if snapshot.decision.estimates.progress >= 1 else (0, 0, 0))
+        return replace(requests, eta=QUIET if snapshot.decision.progress >= 1 else (0, 0, 0))
 
     before = cycle.snapshot.decision.applied
     for snapshot in played(cycle, ask, cycle.snapshot.sample.time_s + within_s):

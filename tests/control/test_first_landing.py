@@ -51,7 +51,7 @@ def excited_by_a_sine(effect: str, profile: str, law: str) -> tuple[VirtualLoop,
     loop.cycles(0.2)
     loop.begin()
     loop.cycles(loop.period_s)
-    while loop.decision.state is State.S3_IDENTIFY and loop.decision.estimates.progress < 1.0:
+    while loop.decision.state is State.S3_IDENTIFY and loop.decision.progress < 1.0:
         loop.cycles(loop.period_s)
     loop.cycle.requests = replace(loop.cycle.requests, eta=(1, 1, 1))
     loop.refer_to(0.75, 2.0)

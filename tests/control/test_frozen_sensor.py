@@ -51,7 +51,7 @@ def run_to_the_fault(loop: VirtualLoop, freeze: Any, stem_pu: Any) -> list[float
     loop.cycles(0.2)
     loop.begin()
     loop.cycles(loop.period_s)
-    while loop.decision.state is State.S3_IDENTIFY and loop.decision.estimates.progress < 1.0:
+    while loop.decision.state is State.S3_IDENTIFY and loop.decision.progress < 1.0:
         loop.cycles(loop.period_s)
     loop.end()
     assert loop.decision.applied.ratios is not None

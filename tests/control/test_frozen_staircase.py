@@ -88,7 +88,7 @@ class Frozen:
         while self.cycle.snapshot.sample.now_s < time_s:
             self.cycle.once()
             seen.append((self.valve.position_m / STROKE_M, self.decision))
-            if s3 and (self.decision.state is not State.S3_IDENTIFY or self.decision.estimates.progress >= 1.0):
+            if s3 and (self.decision.state is not State.S3_IDENTIFY or self.decision.progress >= 1.0):
                 break
         return seen
 
@@ -101,7 +101,7 @@ GONE_ON_S, MARGIN = 14.0, 0.02
 def whole_s(period_s: float) -> float:
     """Return how long S3 takes with a good sensor, s."""
     path = Frozen(period_s, inf).until(300.0, s3=True)
-    assert path[-1][1].estimates.progress == 1.0
+    assert path[-1][1].progress == 1.0
     return period_s * len(path)
 
 

@@ -70,7 +70,7 @@ def identified(spoiled: Spoiled, gap_s: float = 0.0) -> Decision:
             if gap_s and now_s < spoiled.at_s <= now_s + PERIOD_S:
                 for _ in range(round(gap_s / PERIOD_S)):
                     plant.tick(cycle.snapshot.decision.command_pa)
-            if cycle.snapshot.decision.fault or cycle.snapshot.decision.estimates.progress >= 1.0:
+            if cycle.snapshot.decision.fault or cycle.snapshot.decision.progress >= 1.0:
                 return
 
     run(BEGINS_S)

@@ -46,7 +46,7 @@ def valve() -> Frozen:
 @pytest.mark.parametrize("end", [by_mode, at_once, singly])
 def test_a_complete_staircase_is_applied_whatever_ends_it(valve: Frozen, end: Ending) -> None:
     valve.until(300.0, s3=True)
-    assert valve.decision.estimates.progress == 1.0
+    assert valve.decision.progress == 1.0
     end(valve)
     applied = valve.decision.applied
     assert (applied.count, applied.refusals, applied.last_refusal) == (1, 0, Refusal.VALID)

@@ -33,7 +33,7 @@ def identified(plant: Plant, maximum_pa: float) -> Decision:
     loop.cycles(0.2)
     loop.begin()
     loop.cycles(PERIOD_S)
-    while loop.decision.state is State.S3_IDENTIFY and loop.decision.estimates.progress < 1.0:
+    while loop.decision.state is State.S3_IDENTIFY and loop.decision.progress < 1.0:
         loop.cycles(PERIOD_S)
     loop.end()
     return loop.decision
