@@ -97,6 +97,9 @@ class Quality(Code):
     NO_NUMBER = 3, "no number"
 
 
+GOOD, REPEATED, LOST, NO_NUMBER = Quality
+
+
 class InhibitReason(Code):
     """Why the law, or the excitation, is not doing what was asked; served as register `why`."""
 
@@ -149,6 +152,9 @@ class Restored(Code):
     CONFIRMED = 2, "confirmed by the first landings"
     DROPPED = 3, "dropped: a landing contradicts it"
     REPLACED = 4, "replaced by an identification"
+
+
+DROPPED, PROVISIONAL = Restored.DROPPED, Restored.PROVISIONAL
 
 
 class ExperimentState(Code):

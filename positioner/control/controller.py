@@ -13,6 +13,8 @@ from typing import NamedTuple
 
 from config.codes import (
     AUTOMATIC,
+    DROPPED,
+    GOOD,
     MANUAL,
     S0,
     S1,
@@ -21,7 +23,6 @@ from config.codes import (
     Fault,
     InhibitReason,
     Mode,
-    Quality,
     Refusal,
     Restored,
     State,
@@ -228,7 +229,8 @@ def step(
         by_slides=settings.staircase is not None,
     )
     restoration = _restoration(now, found, None if exciting or playing else outcome, mode)
-    dropped = restoration.trust is Restored.DROPPED and memory.last.restoration.provisional
+    is_dropped = restoration.trust is DROPPED
+    dropped = is_dropped and memory.last.restoration.provisional
     applied, law_before = found, memory.law
     if dropped:
         applied, law_before = _nothing_known(now, found)
@@ -239,7 +241,7 @@ def step(
         exciting=playing or exciting,
         law_ready=applied.ratios is not None and not (excitation is not None and excitation.unanswered),
         delta_r_m=reference.delta_m,
-        dropped=restoration.trust is Restored.DROPPED,
+        dropped=is_dropped,
     )
     state = state_in(situation)
     held_pa = _held_pa(now, state, supervision, law_before)
@@ -649,7 +651,7 @@ def _held_pa(now: Now, state: State, supervision: SupervisionMemory, law: Law) -
     if supervision.fault:
         if sample.held_pa is not None:
             return sample.held_pa
-        if sample.quality is Quality.GOOD and sample.status & NOT_READY:
+        if sample.quality is GOOD and sample.status & NOT_READY:
             return sample.pressure_pa
     if state is S3 or memory.last.state is S3:
         return memory.held_pa

@@ -19,7 +19,7 @@ rest, so that there is never a second move before the first has been judged.
 from dataclasses import dataclass, replace
 from math import hypot
 
-from config.codes import Restored
+from config.codes import PROVISIONAL, Restored
 from config.extended_valve import ExtendedValve
 from positioner.control.valve_knowledge import ValveKnowledge
 from positioner.estimation.landings.extended_balance import extended_landing_pa
@@ -60,7 +60,7 @@ class Restoration:
     @property
     def provisional(self) -> bool:
         """Whether landings have still to agree."""
-        return self.trust is Restored.PROVISIONAL
+        return self.trust is PROVISIONAL
 
     def replaced(self) -> "Restoration":
         """Return what has become of it when the valve is identified anew."""

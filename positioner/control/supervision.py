@@ -11,14 +11,14 @@ from collections.abc import Mapping
 from dataclasses import dataclass, field
 from typing import NamedTuple
 
-from config.codes import HOLD, MANUAL, Fault, Mode, Quality
+from config.codes import GOOD, HOLD, LOST, MANUAL, NO_NUMBER, REPEATED, Fault, Mode
 from config.quantities import DeviceStatus
 from config.supervision_table import FaultActionName, SafeActionName
 from positioner.control.records import by_name
 from positioner.control.requests import Requests
 from positioner.control.sample import Sample
 
-GOOD, NO_FAULT = Quality.GOOD, Fault.NONE
+NO_FAULT = Fault.NONE
 
 
 @dataclass(frozen=True, slots=True)
@@ -107,8 +107,8 @@ def supervise(
     now_s, quality = sample.now_s, sample.quality
     first = memory.good_s == -math.inf
     alive = first or requests.heartbeats != memory.heartbeats
-    bad_in_a_row = 0 if good or quality is Quality.REPEATED else memory.bad_in_a_row + 1
-    lost_in_a_row = memory.lost_in_a_row + 1 if quality is Quality.LOST else 0
+    bad_in_a_row = 0 if good or quality is REPEATED else memory.bad_in_a_row + 1
+    lost_in_a_row = memory.lost_in_a_row + 1 if quality is LOST else 0
     good_s = now_s if good or first else memory.good_s
     heartbeat_s = now_s if alive else memory.heartbeat_s
 
@@ -151,10 +151,10 @@ def _cause(
         return Fault.RESTARTED
     if bad_in_a_row >= limits.lost_after_cycles:
         return Fault.NO_REPLY if unheard else Fault.IMPLAUSIBLE
-    if sample.status & UNFIT_STATUS and sample.quality is not Quality.LOST:
+    if sample.status & UNFIT_STATUS and sample.quality is not LOST:
         return Fault.DEVICE
     if age_s > limits.stale_after_s:  # on a slow line sooner than so many cycles
-        by_quality = {Quality.LOST: Fault.NO_REPLY, Quality.NO_NUMBER: Fault.IMPLAUSIBLE}
+        by_quality = {LOST: Fault.NO_REPLY, NO_NUMBER: Fault.IMPLAUSIBLE}
         return by_quality.get(sample.quality, Fault.STALE)
     return NO_FAULT
 

@@ -13,7 +13,7 @@ import time
 from collections.abc import Sequence
 from threading import Event
 
-from config.codes import Quality
+from config.codes import GOOD
 from positioner.control.controller import Controller
 from positioner.control.controller_memory import Decision
 from positioner.control.requests import Requests
@@ -92,7 +92,7 @@ class Cycle:
         sent_pa = self._controller.command_pa
         sample = self.link.exchange(sent_pa)
         decision = self._controller.step(sample, self.requests)
-        if self.recorder is not None and sample.quality is Quality.GOOD:
+        if self.recorder is not None and sample.quality is GOOD:
             # A device that was only looked at has got nothing.
             given_pa = sent_pa if sample.held_pa is None else sample.held_pa
             in_force_pa = self._pace.in_force_pa(given_pa, decision.command_pa)

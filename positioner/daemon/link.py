@@ -20,7 +20,7 @@ import math
 import time
 from dataclasses import dataclass
 
-from config.codes import Quality
+from config.codes import GOOD, LOST, NO_NUMBER, REPEATED
 from config.daemon_file import DaemonFile
 from config.quantities import ActionName, DeviceStatus
 from config.travel import Travel
@@ -140,7 +140,7 @@ class Link:
         self._asked_s = math.inf
         """When the exchange under way began."""
         self._reading: Reading | None = None
-        self._sample = Sample(now_s=0.0, time_s=0.0, position_m=math.nan, pressure_pa=math.nan, quality=Quality.LOST)
+        self._sample = Sample(now_s=0.0, time_s=0.0, position_m=math.nan, pressure_pa=math.nan, quality=LOST)
 
     def open(self) -> tuple[float, Reading]:
         """Connect for the first time; return the command in force in the device, in Pa, and a first reading.
@@ -294,7 +294,7 @@ class Link:
         self._commanded_s = awake_s()
         self._say_found(held_pa, reading.status)
         repeated = before is not None and _same_sample(before, reading)
-        return sample._replace(quality=Quality.REPEATED) if repeated else sample
+        return sample._replace(quality=REPEATED) if repeated else sample
 
     def _say_found(self, held_pa: float, status: int) -> None:
         """Say that the device is there: it is back, or was never reached before, or was but set up for long."""
@@ -328,7 +328,7 @@ class Link:
         self._was_away = True
         self._sample = self._lost()
         if isinstance(error, NoNumber):
-            self._sample = self._sample._replace(quality=Quality.NO_NUMBER)
+            self._sample = self._sample._replace(quality=NO_NUMBER)
         refused = isinstance(error, Refused)
         if self._connected and (isinstance(error, NoNumber) or (refused and self._refusals < MOST_REFUSALS)):
             self._refusals += refused
@@ -342,7 +342,7 @@ class Link:
         now_s = self._pace.now_s(None)
         return self._sample._replace(
             now_s=now_s,
-            quality=Quality.LOST,
+            quality=LOST,
             held_pa=None,
             overwritten=False,
             unattended_s=0.0,
@@ -366,7 +366,7 @@ class Link:
             time_s=now_s if reading.device_time_s is None else reading.device_time_s,
             position_m=reading.position_m if travel is None else travel.turned_m(reading.position_m),
             pressure_pa=self._acted_pa(reading, command_pa, before_pa),
-            quality=Quality.REPEATED if repeated else Quality.GOOD,
+            quality=REPEATED if repeated else GOOD,
             status=reading.status,
             emergency=reading.emergency,
         )

@@ -13,7 +13,7 @@ from dataclasses import dataclass
 from math import inf, isfinite, nan
 
 from config.alarm_table import CLASSED, AlarmsTable
-from config.codes import Fault, Mode, Ne107Cause, Ne107Status, Quality, State
+from config.codes import AUTOMATIC, GOOD, S3, Fault, Ne107Cause, Ne107Status
 from config.daemon_file import DaemonFile, HealthTable
 from config.supervision_table import Ne107Letter, SupervisionTable
 from config.travel import Travel
@@ -180,10 +180,10 @@ class Health:
             self._take(decision)
         if requests is not self._requests:
             self._obey(requests)
-        if sample.quality is not Quality.GOOD or not isfinite(sample.position_m):
+        if sample.quality is not GOOD or not isfinite(sample.position_m):
             return
         self._travel.enter(sample.position_m)
-        follows = decision.mode is Mode.AUTOMATIC and decision.state is not State.S3_IDENTIFY
+        follows = decision.mode is AUTOMATIC and decision.state is not S3
         self._pressed_s = inf if decision.cut_off == WITHIN else min(self._pressed_s, sample.now_s)
         if follows and decision.cut_off == WITHIN:
             self._stiction.enter(sample.now_s, sample.position_m, decision.reference_m)
