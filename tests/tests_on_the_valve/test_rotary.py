@@ -19,8 +19,8 @@ ROTARY = load_valve(shipped_valve("rotary"))
 VALVE = ROTARY.valve
 TORQUE_NM_PER_PA, TRAVEL_RAD = VALVE.diaphragm_area_m2, VALVE.stroke_m
 SPRING_PA_PER_DEG = radians(VALVE.spring_n_per_m) / TORQUE_NM_PER_PA
-FRICTION_NM = 0.5 * (VALVE.coulomb_n + VALVE.static_n)
-"""Of a shaft that sticks and slips under a slow ramp."""
+FRICTION_NM = VALVE.coulomb_n
+"""Of a shaft that slides all the way: these ramps take 20 s."""
 SITE = """[valve]
 name = "FV-401"
 travel_deg = 95.0
@@ -32,7 +32,7 @@ maximum_pa = 280e3
 stale_after_s = 0.5
 [experiment]
 travel_window = [0, 1]
-limit_s = 300
+limit_s = 90
 [device.map]
 position_deg = { address = 0, type = "int16", scale = 0.0244140625 }
 command_pa = { address = 10, type = "uint16", scale = 10.0 }
