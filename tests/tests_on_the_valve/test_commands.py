@@ -117,6 +117,14 @@ def test_the_others_pass_and_print_their_figures(
     assert [each.kind for each in kept(site)] == ["as_found"]
 
 
+def test_a_continuous_stroke_that_has_no_time_to_break_the_stem_loose_is_refused(
+    site: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    assert main(["cst", str(site)]) == 2
+    assert "--rate: at 0.0005 the command goes 1120 Pa in half of experiment.limit_s" in capsys.readouterr().err
+    assert kept(site) == []
+
+
 def test_steps_of_a_stem_at_its_end_are_refused(site: Path, capsys: pytest.CaptureFixture[str]) -> None:
     assert main(["steps", str(site)]) == 1
     assert "the stem is at an end, where steps move nothing" in capsys.readouterr().err
