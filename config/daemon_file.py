@@ -56,8 +56,8 @@ Network = Annotated[IPvAnyNetwork, BeforeValidator(_written)]
 NOT_POSITIONED = {
     "double_acting": "a cylinder without a spring needs a second pressure, commanded and measured, and a law for their "
     "difference; allowed is spring_return",
-    "booster": "a volume booster needs its rates of filling and venting, which a law must know; set its bypass so that "
-    "pressure follows its command within a cycle, and write spring_return",
+    "booster": "a volume booster needs its rates of filling and venting, which a law must know: positioner commission "
+    "prints them; with effect rate_limit of these in the file of [law] valve, write spring_return",
 }
 """Actuators that people have and that no law here commands: what would be needed."""
 

@@ -4,7 +4,7 @@
     direction       the command creeps until the reading moves by a little, and back
     slow ramps      over the whole range of commands, up and down, at two rates: travel, ends, bench set, spring,
                     friction (`signature`); at such a pace the stem comes to its seat and to its stop
-    stroke times    the same way as fast as `[experiment] rate_limit_pa_per_s` permits
+    stroke times    the same way as fast as `[experiment] rate_limit_pa_per_s` permits; how fast the pressure follows
     leak            at half travel the command is held: what creeps
     small steps     dead band, resolution, the smallest move
 
@@ -28,6 +28,7 @@ from config.recording import Column, Recording
 from config.travel import ActionWord
 from positioner.response.figure import Figure, undetermined
 from positioner.tests_on_the_valve import signature, small_steps
+from positioner.tests_on_the_valve.air_rates import air_rates
 from positioner.tests_on_the_valve.outcome import Outcome, Quantity
 from positioner.tests_on_the_valve.program import Bounds, Leap, Played, Player, Program, ramped
 from positioner.tests_on_the_valve.thresholds import THRESHOLDS
@@ -120,7 +121,9 @@ def _commissioned(valve: Watching, name: str, bounds: Bounds, show: Callable[[st
     bench = [found.figure(each) for each in ("bench_low_pa", "bench_high_pa")]
     friction = found.figure("friction_pa")
     ends = (low.value, high.value)
-    up_s, down_s = _stroke_times(_played(valve, _strokes(bounds, start_pa), show), sign, ends, noise_m)
+    strokes = _played(valve, _strokes(bounds, start_pa), show)
+    up_s, down_s = _stroke_times(strokes, sign, ends, noise_m)
+    filling, venting = air_rates(strokes, bounds.rate_pa_per_s)
     half_pa = 0.5 * sum(each.value or 0.0 for each in bench)
     leak = _leak(_played(valve, _held(bounds, start_pa, half_pa), show), sign)
     steps = _steps(valve, bounds, start_pa, half_pa, friction, (travel.value, sign, name), show)
@@ -140,6 +143,8 @@ def _commissioned(valve: Watching, name: str, bounds: Bounds, show: Callable[[st
         *(each for each in found.quantities if each.name not in LEFT_OUT),
         Quantity("opening_s", "opens within", "s", opening),
         Quantity("closing_s", "closes within", "s", closing),
+        Quantity("filling_pa_per_s", "pressure rises by", "Pa/s", filling),
+        Quantity("venting_pa_per_s", "pressure falls by", "Pa/s", venting),
         Quantity("supply_margin", "commands above what the upper end needs, of the span", "1", adequate),
         Quantity("leak_m_per_s", "creep with the command held", "m/s", leak),
         *(each for each in steps.quantities if each.name in ("dead_band_pa", "resolution_pa", "least_move_m")),

@@ -119,6 +119,10 @@ class Thresholds:
     """Of the travel: a stroke is over,"""
     arrived_sigmas: float = 3.0
     """or so many deviations of the noise before it."""
+    inner_air: tuple[float, float] = (0.2, 0.8)
+    """Of what the pressure spans, where its rate is taken: its ends are rounded by the I/P."""
+    as_commanded: float = 0.9
+    """Of the command's rate: a pressure that is as fast shows the command and no limit of its own."""
     pressed: float = 0.15
     """Of the bench set's span, above the command that takes the stem to its upper end: what presses it there."""
     supply_margin: float = 0.05

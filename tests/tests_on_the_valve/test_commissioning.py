@@ -10,6 +10,7 @@ import pytest
 from config.codes import Fault, ValveTestVerdict
 from config.daemon_file import DaemonFile, load_daemon
 from config.errors import InputError
+from config.recording import Recording
 from config.slave_file import DeviceFault, Initial
 from config.toml_text import with_values
 from config.travel import ActionWord
@@ -18,6 +19,7 @@ from positioner.cli.main import main
 from positioner.cli.parts.own_valve import unknown_travel
 from positioner.control.played_experiment import ROUNDING
 from positioner.control.settings import Settings
+from positioner.tests_on_the_valve.air_rates import air_rates
 from positioner.tests_on_the_valve.commissioning import Commissioned, commission
 from positioner.tests_on_the_valve.small_steps import SmallSteps, programme, small_steps
 from tests.control.virtual_loop import VirtualLoop
@@ -138,6 +140,24 @@ def test_a_fault_on_the_way_ends_it_under_the_command_in_force_never_vented() ->
     held_pa = valve.command_pa()
     valve.watch(5.0)
     assert valve.command_pa() == held_pa > 0.0
+
+
+@pytest.mark.parametrize(("filling", "venting"), [(30e3, 20e3), (30e3, 200e3)])
+def test_the_rates_of_a_booster_are_found_where_the_command_is_faster(filling: float, venting: float) -> None:
+    time_s = np.arange(0.0, 30.0, 0.05)
+    command_pa = np.interp(time_s, (0.0, 1.0, 2.4, 13.0, 14.4), (0.0, 0.0, 140e3, 140e3, 0.0))
+    pressure_pa = [0.0]
+    for asked_pa in command_pa[1:].tolist():
+        change_pa = asked_pa - pressure_pa[-1]
+        pressure_pa.append(pressure_pa[-1] + min(max(change_pa, -0.05 * venting), 0.05 * filling))
+    columns = {"time_s": time_s, "command_pa": command_pa, "position_m": 0.0 * time_s}
+    found = air_rates(Recording(columns | {"pressure_pa": np.array(pressure_pa)}), 100e3)
+    assert found[0].value == pytest.approx(filling, rel=0.01)
+    if venting < 100e3:
+        assert found[1].value == pytest.approx(venting, rel=0.01)
+    else:
+        assert found[1].reason == "as fast as the command, 100 kPa/s"
+    assert "no pressure is measured" in (air_rates(Recording(columns), 100e3)[0].reason or "")
 
 
 def test_who_interrupts_it_gets_the_command_before_back() -> None:
