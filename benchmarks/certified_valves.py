@@ -3,7 +3,7 @@
     python -m benchmarks.certified_valves [--valves 10000] [--moves 8] [--seed 0]
 
 For each valve intervals are drawn (break-away to 8 % of the stroke, known within a factor of 1 to 3; balance known
-within 0.3 % and scatter to 0.05 % of the stroke), and the law is asked for its certificate. Where it gives one, a valve
+within 0.1 % and scatter to 0.03 % of the stroke), and the law is asked for its certificate. Where it gives one, a valve
 is drawn inside them, half of the time at their ends, and makes small moves under the law of the daemon
 (`tests.control.scripted_stem`). Counted is who ends elsewhere, takes more slides or goes farther beyond than is proved,
 or moves when left alone. Then come laws that are bad on purpose: each must be refused wherever the good one is not.
@@ -25,7 +25,9 @@ from positioner.estimation.landings.breakaway_distance import BreakawayDistance,
 from tests.control.scripted_stem import SETTINGS, SLOPE_PA_PER_M, STROKE_M, ScriptedStem
 
 LONGEST, KNOWN_WITHIN, GIVES = 0.08, 3.0, 0.02
-BALANCE, SCATTER = 3e-3, 5e-4
+BALANCE, SCATTER = 1e-3, 3e-4
+FRICTION = (1.5, 3.0)
+"""Of the break-away distance."""
 ALONE_S = 600.0
 ROUNDING_M = 1e-9
 BAD_LAWS = {
@@ -68,6 +70,7 @@ def drawn_known(rng: np.random.Generator) -> KnownValve:
         balance_m=STROKE_M * float(rng.uniform(0.0, BALANCE)),
         scatter_m=STROKE_M * float(rng.uniform(0.0, SCATTER)),
         distances=BreakawayDistance(onward, onward, turning, turning),
+        friction_m=turning_m * float(rng.uniform(*FRICTION)),
     )
 
 
@@ -77,12 +80,13 @@ def drawn_inside(known: KnownValve, rng: np.random.Generator) -> DrawnInside:
     def inside(interval: Interval) -> float:
         return float(interval.broke_m if rng.random() < 0.5 else rng.uniform(interval.held_m, interval.broke_m))
 
-    friction_pa = SLOPE_PA_PER_M * known.distances.turning_up.broke_m * float(rng.uniform(1.5, 3.0))
+    friction_pa = SLOPE_PA_PER_M * known.friction_m
+    preload_pa = friction_pa * float(rng.uniform(-0.2, 0.2))
     onward_m = inside(known.distances.onward_up)
     stem = DrawnInside(
         SETTINGS,
-        up_pa=friction_pa * float(rng.uniform(0.8, 1.2)),
-        down_pa=friction_pa * float(rng.uniform(0.8, 1.2)),
+        up_pa=friction_pa + preload_pa,
+        down_pa=friction_pa - preload_pa,
         onward_m=onward_m,
         turning_m=inside(known.distances.turning_up),
         scatter_m=known.scatter_m,

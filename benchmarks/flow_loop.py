@@ -1,18 +1,23 @@
 """The flow loop of `positioner demo --loop flow` under other tunings: is the comparison fair, and what does it hang on?
 
-    python -m benchmarks.flow_loop
+    python -m benchmarks.flow_loop [--rivals]
 
-First the conventional positioner, K and R over a grid, gain margin 2 at the least: what ours is compared with is the
+`--rivals` prints one table: our laws, the compensators of `benchmarks.rival_laws`, each with the best of a grid of the
+tunings that its paper gives, and what each costs the valve. The dead band of the two-move method is ours.
+
+Without it, first the conventional positioner, K and R over a grid, gain margin 2 at the least: what ours is compared with is the
 pair that leaves the least deviation, summed over both periods, among those that wore the valve no more than ours when
 ours made two to three times today's strokes; it wears the valve more than ours now.
 Then ours with other dead bands, with a least time between excursions, and under a faster controller. Takes two minutes.
 """
 
+import argparse
 from collections.abc import Iterator
 from dataclasses import replace
 from itertools import product
 
-from positioner.cli.parts.flow_cases import FlowCase, virtual_outcome
+from benchmarks.rival_laws import ADDED, RivalSettings
+from positioner.cli.parts.flow_cases import POSITIONERS, FlowCase, virtual_outcome
 from positioner.cli.parts.flow_demo import PERIODS_S
 from positioner.control.laws.conventional.conventional_law import ConventionalSettings
 from positioner.control.settings import Settings
@@ -62,6 +67,62 @@ def lines() -> Iterator[str]:
             yield _line(name, [virtual_outcome(replace(case, period_s=each)).figures for each in PERIODS_S])
 
 
+AMPLITUDES = (0.015, 0.03, 0.045, 0.06)
+"""p.u.: a quarter of the stick band to all of it."""
+SCANS = {"knocker": ((1, 2), (2, 5)), "constant reinforcement": ((1,), (1,)), "two moves": ((1, 2), (1,))}
+SCAN_S = 0.5
+RIVAL_HEADS = ("std, %", "peak, %", "strokes/min", "reversals/min", "vented/min")
+
+
+def figures_of_rival(kind: str, period_s: float, amplitude: float, lasts: int, every: int) -> FlowFigures:
+    """Return the figures of a compensator so tuned, scans of the DCS."""
+
+    def tuned(settings: Settings) -> Settings:
+        law = settings.law
+        assert isinstance(law, ConventionalSettings)
+        rival = RivalSettings(
+            kind=kind,
+            amplitude=amplitude,
+            lasts_s=lasts * SCAN_S,
+            every_s=every * SCAN_S,
+            stroke_m=settings.limits.stroke_m,
+            minimum_pa=law.minimum_pa,
+            maximum_pa=law.maximum_pa,
+        )
+        return replace(settings, law=rival)
+
+    return virtual_outcome(FlowCase("conventional", period_s), tuned).figures
+
+
+def rivals(period_s: float) -> Iterator[str]:
+    """Yield the table of our laws and the published compensators."""
+    yield f"{'':48}" + "".join(f"{each:>15}" for each in RIVAL_HEADS)
+    for law in POSITIONERS:
+        yield _rival_row(POSITIONERS[law], virtual_outcome(FlowCase(law, period_s)).figures)
+    for kind in ADDED:
+        lasts, every = SCANS.get(kind, SCANS["knocker"])
+        tried = {each: figures_of_rival(kind, period_s, *each) for each in product(AMPLITUDES, lasts, every)}
+        (amplitude, last, often), best = min(tried.items(), key=lambda each: each[1].deviation_std)
+        yield _rival_row(f"{kind}, {100 * amplitude:g} %, {last} of {often} scans", best)
+
+
+def _rival_row(name: str, found: FlowFigures) -> str:
+    return (
+        f"{name:48}{100 * found.deviation_std:15.2f}{100 * found.peak_to_peak:15.1f}{found.strokes_per_minute:15.2f}"
+        f"{found.reversals_per_minute:15.1f}{found.vented_per_minute:15.2f}"
+    )
+
+
+def main() -> None:
+    """Print the tables."""
+    parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
+    parser.add_argument("--rivals", action="store_true")
+    parser.add_argument("--period-ms", type=float, default=1e3 * PERIODS_S[0])
+    arguments = parser.parse_args()
+    for line in rivals(1e-3 * arguments.period_ms) if arguments.rivals else lines():
+        print(line, flush=True)
+
+
 def _heads(*names: str) -> str:
     return "".join(f"{f'{1e3 * each:g} ms: std, %':>20}" + "".join(f"{n:>15}" for n in names) for each in PERIODS_S)
 
@@ -75,5 +136,4 @@ def _line(name: str, found: list[FlowFigures]) -> str:
 
 
 if __name__ == "__main__":
-    for line in lines():
-        print(line, flush=True)
+    main()

@@ -3,6 +3,8 @@
     e = q - q_set               std e, max e - min e, integral of abs(e)
     e_v = q - q_0               std e_v, what the valve adds; q_0 is the same loop's flow, the stem at its reference
 
+    air = sum of the falls of the pressure, over that which takes the stem through its travel: so often is it vented
+
 Travel and reversals of the stem are counted as the daemon's own accumulator counts them.
 """
 
@@ -35,6 +37,8 @@ class FlowCourse:
     flow: Series
     reference_pu: Series
     stem_pu: Series
+    pressure_pu: Series | None = None
+    """Of the pressure over the travel; None: of a stem that needs none."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -49,20 +53,24 @@ class FlowFigures:
     """Deviation from the flow that a valve without friction would give."""
     strokes_per_minute: float
     reversals_per_minute: float
+    vented_per_minute: float = 0.0
+    """Air exhausted: fills of the actuator over its travel."""
 
 
 def course_in(
     cycle: "Cycle", loop: "FlowLoop", write: Callable[[float], None], stroke_m: float, duration_s: float
 ) -> FlowCourse:
     """Run a cycle in a loop for a while, s, `write` taking each reference, p.u., to the daemon."""
-    begin_s = cycle.snapshot.sample.time_s
-    rows: list[tuple[float, float, float, float]] = []
+    begin_s, ratios = cycle.snapshot.sample.time_s, cycle.snapshot.decision.applied.ratios
+    over_travel_pa = 1.0 if ratios is None else -ratios.b_over_c * stroke_m
+    rows: list[tuple[float, float, float, float, float]] = []
 
     def dcs(snapshot: "Snapshot", _: "Requests") -> "Requests":
         time_s, stem_pu = snapshot.sample.time_s, snapshot.sample.position_m / stroke_m
         if loop.advance(time_s, stem_pu):
             write(loop.reference_pu)
-        rows.append((time_s - begin_s, loop.flow, loop.reference_pu, stem_pu))
+        pressure_pu = snapshot.sample.pressure_pa / over_travel_pa
+        rows.append((time_s - begin_s, loop.flow, loop.reference_pu, stem_pu, pressure_pu))
         return cycle.requests
 
     for _ in played(cycle, dcs, begin_s + duration_s):
@@ -100,7 +108,13 @@ def figures(course: FlowCourse, frictionless: FlowCourse, setpoint: float, from_
         added_std=float(np.std(course.flow[steady] - frictionless.flow[steady])),
         strokes_per_minute=travel / minutes,
         reversals_per_minute=reversals / minutes,
+        vented_per_minute=0.0 if course.pressure_pu is None else _vented(course.pressure_pu[steady]) / minutes,
     )
+
+
+def _vented(pressure_pu: Series) -> float:
+    """Return the sum of the falls of a pressure."""
+    return float(np.maximum(0.0, -np.diff(pressure_pu)).sum())
 
 
 def _wear(stem_pu: Series, start: int) -> tuple[float, int]:

@@ -19,7 +19,15 @@ OURS = "slides"
 PERIODS_S = (0.02, 0.1)
 CASES = tuple(FlowCase(law, period_s) for period_s in PERIODS_S for law in POSITIONERS)
 ON_BUS = FlowCase(OURS, PERIODS_S[0], settle_s=30.0, measured_s=60.0)
-HEADINGS = ("std, %", "peak to peak, %", "abs error, % s", "valve adds, %", "strokes/min", "reversals/min")
+HEADINGS = (
+    "std, %",
+    "peak to peak, %",
+    "abs error, % s",
+    "valve adds, %",
+    "strokes/min",
+    "reversals/min",
+    "vented/min",
+)
 
 
 def run_flow(arguments: Namespace) -> int:
@@ -95,6 +103,7 @@ def _row(name: str, found: FlowFigures) -> str:
         _percent(found.added_std),
         f"{found.strokes_per_minute:.2f}",
         f"{found.reversals_per_minute:.1f}",
+        f"{found.vented_per_minute:.2f}",
     )
     return f"{name:24}" + "".join(f"{each:>16}" for each in shown)
 

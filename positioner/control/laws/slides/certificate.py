@@ -3,11 +3,13 @@
 A slide towards r in a direction lands e off, for the balance is known amiss by b there, and slides scatter by ε; what
 it missed corrects the balance by a share g = 1/(1 + w_0) of that (`local_balance.HELD_BACK`). The landing map is
 
-    e' = b + ε,   b' = (1 - g) b - g ε        abs(b) <= B, abs(ε) <= S, carried on as intervals:
-    E' = B + S,   B' = abs(1 - g) B + g S
+    e' = b + ε,   b' = (1 - g) b - ε''        abs(b) <= B, abs(ε) <= S, abs(ε'') <= 2 S, carried on as intervals:
+    E' = B + S,   B' = abs(1 - g) B + 2 S
 
-and d, the break-away distance of each direction, of going on and of turning, lies in held < d <= broke. Proved is, if
-every valve inside these intervals has it:
+ε'' being what scatter teaches: over the travel, and nearby, each no more than S. Break-away goes over the travel as
+friction over slope does, and both are told from landings, amiss by E: by a factor of 1 + 4 E/friction. And d, the
+break-away distance of each direction, of going on and of turning, lies in held < d <= broke. Proved is, if every valve
+inside these intervals has it:
 
     a slide that is planned holds H times at most, until it goes B farther than has broken loose       (`Interval`)
     the way back from an excursion breaks loose: E_2 <= (1.02 - 1) d + what is added for rounding
@@ -19,12 +21,12 @@ beyond its way than max(1.02 d_turning, d_going on) + rounding + E_1, d the long
 proved is refused, with what would have to be known better.
 """
 
-from collections.abc import Sequence
 from dataclasses import dataclass
 from itertools import pairwise
 from math import sqrt
 from statistics import median
 
+from positioner.control.laws.slides.slide_balance import Balance
 from positioner.control.laws.slides.slide_bounds import SlideBounds
 from positioner.control.valve_knowledge import ValveKnowledge
 from positioner.estimation.landings.breakaway_distance import BreakawayDistance, Interval, Went
@@ -38,6 +40,8 @@ MANY = 14
 """Slides that hold in a row: no move has so many."""
 FEWEST = 3
 """Landings in a direction from which their scatter is told."""
+PLACES = (0.1, 0.3, 0.5, 0.7, 0.9)
+"""Of the stroke, where break-away is looked at."""
 DIRECTIONS = {1: "up", -1: "down"}
 
 
@@ -48,7 +52,9 @@ class KnownValve:
     Attributes:
         balance_m: B, how far slides may land off for the balance is known amiss.
         scatter_m: S, how far one may land off another.
-        distances: break-away.
+        distances: break-away, in the middle of the travel.
+        friction_m: F_c/k_s.
+        local: by what factor they are longer elsewhere, at the most.
         quantum_m: of the position.
         rounded_m: how far the device rounds where a slide lands.
     """
@@ -56,6 +62,8 @@ class KnownValve:
     balance_m: float
     scatter_m: float
     distances: BreakawayDistance
+    friction_m: float
+    local: float = 1.0
     quantum_m: float = 0.0
     rounded_m: float = 0.0
 
@@ -87,7 +95,7 @@ class Box:
 
     def after_landing(self, gain: float, scatter_m: float) -> "Box":
         """Return the box after one more landing."""
-        return Box(self.balance_m + scatter_m, abs(1.0 - gain) * self.balance_m + abs(gain) * scatter_m)
+        return Box(self.balance_m + scatter_m, abs(1.0 - gain) * self.balance_m + 2.0 * scatter_m)
 
 
 def known_valve(knowledge: ValveKnowledge, stroke_m: float) -> KnownValve | Refused:
@@ -107,7 +115,15 @@ def known_valve(knowledge: ValveKnowledge, stroke_m: float) -> KnownValve | Refu
         off_m += [abs(each) for each in left_m]
         apart_m.append(1.4826 * median(abs(a - b) for a, b in pairwise(left_m)) / sqrt(2.0))
     scatter_m = DEVIATIONS * max(*apart_m, median(each.std_m for each in knowledge.landings))
-    return KnownValve(balance_m=max(off_m) + scatter_m, scatter_m=scatter_m, distances=knowledge.distances)
+    balance = Balance(knowledge.ratios, knowledge.landings, knowledge.held, stroke_m)
+    places = (balance.local(share * stroke_m) for share in PLACES)
+    return KnownValve(
+        balance_m=max(off_m) + scatter_m,
+        scatter_m=scatter_m,
+        distances=knowledge.distances,
+        friction_m=knowledge.friction_m,
+        local=max(max(each) for each in places),
+    )
 
 
 def _off_pa(each: SlideOutcome, knowledge: ValveKnowledge, stroke_m: float) -> float:
@@ -128,14 +144,19 @@ def certified(known: KnownValve, bounds: SlideBounds, held_back: float = HELD_BA
     if not 0.0 <= held_back < 1.0:
         return Refused("what slides miss is not corrected to less", "the law: held_back")
     gain, band_m = 1.0 / (1.0 + held_back), bounds.dead_band_m
-    first = Box(0.0, known.balance_m).after_landing(gain, known.scatter_m)
+    learnt = Box(0.0, known.balance_m).after_landing(gain, known.scatter_m)
+    amiss_m = max(known.balance_m, learnt.balance_m)
+    first = Box(0.0, amiss_m).after_landing(gain, known.scatter_m)
     second = first.after_landing(gain, known.scatter_m)
-    onward, turning = (_all(known.distances, turning=each) for each in (False, True))
+    told = 1.0 + 4.0 * first.error_m / known.friction_m
+    onward, turning = (
+        [known.distances.at(s, turning=each).times(known.local * told) for s in DIRECTIONS] for each in (False, True)
+    )
     if not all(each.seen for each in (*onward, *turning)):
         return Refused("a direction in which no slide has broken loose", "break-away distances")
     shortest_m = thresholds.shortest * bounds.stroke_m
     rounding_m = thresholds.rounded_quanta * known.quantum_m + known.rounded_m
-    spare_m = (thresholds.return_margin - 1.0) * min(each.likely_m for each in turning) + rounding_m
+    spare_m = (thresholds.return_margin - 1.0) * min(each.likely_m for each in turning) / told + rounding_m
     if second.error_m > spare_m:
         return Refused(
             f"the way back may be too short: a slide lands {_mm(second.error_m)} off, and {_mm(spare_m)} is to spare",
@@ -144,9 +165,7 @@ def certified(known: KnownValve, bounds: SlideBounds, held_back: float = HELD_BA
     count = _excursions(first, gain, known.scatter_m, band_m, bounds)
     if count is None:
         return Refused(f"slides land {_mm(second.error_m)} off, and the dead band is {_mm(band_m)}", _of_error(known))
-    tried_onward, tried_turning = (
-        max((_tried(each, known.balance_m) for each in both), key=len) for both in (onward, turning)
-    )
+    tried_onward, tried_turning = (max((_tried(each, amiss_m) for each in both), key=len) for both in (onward, turning))
     out, back = max(len(tried_onward), len(tried_turning)) - 1, len(tried_turning) - 1
     slides = 2 * count + 2 * (first.error_m > spare_m) + out + 2 * back
     if slides > thresholds.most_slides:
@@ -155,19 +174,13 @@ def certified(known: KnownValve, bounds: SlideBounds, held_back: float = HELD_BA
         return Refused(
             f"{slides} slides may be needed, and a move has {thresholds.most_slides}", f"break-away: {apart}"
         )
-    turns_m, goes_on_m = (
-        max(shortest_m, *(max(_tried(each, known.balance_m)) for each in both)) for both in (turning, onward)
-    )
+    turns_m, goes_on_m = (max(shortest_m, *(max(_tried(each, amiss_m)) for each in both)) for both in (turning, onward))
     beyond_m = max(thresholds.return_margin * turns_m, goes_on_m) + rounding_m
     return Certificate(
         most_slides=slides,
         beyond_m=min(beyond_m, bounds.excursion_limit_m) + first.error_m,
         ends_within_m=max(band_m, min(first.error_m, _widened_m(band_m, slides, bounds))),
     )
-
-
-def _all(distances: BreakawayDistance, *, turning: bool) -> Sequence[Interval]:
-    return [distances.at(each, turning=turning) for each in DIRECTIONS]
 
 
 def _excursions(first: Box, gain: float, scatter_m: float, band_m: float, bounds: SlideBounds) -> int | None:
