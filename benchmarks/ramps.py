@@ -1,6 +1,6 @@
 """Ramps: how near does a law come to what a stem can do that only moves by jumps?
 
-    python -m benchmarks.ramps [--periods-ms 10 20 100] [--rates 0.05 0.2 0.5 1 2 5] [--laws slides conventional] [--seed 0]
+    python -m benchmarks.ramps [--periods-ms 10 20 100] [--rates 0.05 0.2 0.5 1 2 5] [--laws slides] [--seed 0]
 
 A stem that breaks loose only where it is sent d = (F_s - F_c)/k_s follows a ramp by jumps of d. At best it is d/2 ahead
 after each and d/2 behind before the next:

@@ -30,7 +30,8 @@ the reference leave errors of 0 to m, rms m/sqrt(3), those that land ahead of it
 
     -m/2 to m/2,   rms m/sqrt(12)      lead = min(m/2, N D)
 
-with the same travel: no stem that can only be moved by m comes nearer. N D is as far as N references go.
+with the same travel: no stem that can only be moved by m comes nearer. N D is as far as N references go. A ramp
+that has gone as far as m since it turned is taken to go on by m/2, and no excursion is made for it.
 """
 
 from dataclasses import dataclass
@@ -64,6 +65,8 @@ class ReferenceCourse:
     changed_s: float
     changes_m: tuple[float, ...] = ()
     intervals_s: tuple[float, ...] = ()
+    turned_m: float | None = None
+    """The reference at which the run turned round last, or began, m; None: it rests."""
     steps: tuple[tuple[float, float], ...] = ()
     """The last changes that came after a rest, m, and the intervals before them, s; the latest first."""
 
@@ -75,11 +78,14 @@ class ReferenceCourse:
         if interval_s > SCAN_S:
             steps = ((reference_m - self.value_m, interval_s), *self.steps)[:STEPS_ALIKE]
             return ReferenceCourse(reference_m, now_s, steps=steps)
+        change_m = reference_m - self.value_m
+        turns = self.turned_m is None or (bool(self.changes_m) and change_m * self.changes_m[0] < 0.0)
         return ReferenceCourse(
             reference_m,
             now_s,
-            (reference_m - self.value_m, *self.changes_m)[:KEPT],
+            (change_m, *self.changes_m)[:KEPT],
             (interval_s, *self.intervals_s)[:KEPT],
+            self.value_m if turns else self.turned_m,
         )
 
     def slow_ramp_m_per_s(self, now_s: float) -> float:
@@ -114,6 +120,10 @@ class ReferenceCourse:
             return 0
         return 1 if min(last_m) > 0.0 else -1 if max(last_m) < 0.0 else 0
 
+    def goes_far(self, way_m: float) -> bool:
+        """Whether the run is a ramp that has gone farther than a slide of way_m, the shortest."""
+        return self.trend != 0 and self.turned_m is not None and abs(self.value_m - self.turned_m) >= way_m
+
     def middle_m(self, now_s: float, way_m: float) -> float:
         """Return r_m, m: what the references scatter about; of one that rests, goes somewhere, or steps, itself.
 
@@ -127,7 +137,9 @@ class ReferenceCourse:
 
     def lead_m(self, now_s: float, way_m: float) -> float:
         """Return how far ahead of the reference, m, signed, a slide is to land, the shortest of which is way_m."""
-        return 0.0 if self.rests(now_s) else self.trend * min(0.5 * way_m, COMING * self.change_m)
+        if self.rests(now_s):
+            return 0.0
+        return self.trend * (0.5 * way_m if self.goes_far(way_m) else min(0.5 * way_m, COMING * self.change_m))
 
     def takes_back(self, now_s: float, error_m: float, way_m: float, away_s: float) -> bool:
         """Whether an error r - x, m, is left to the references to come.
@@ -140,7 +152,7 @@ class ReferenceCourse:
         """
         if self.rests(now_s):
             return abs(error_m) ** 3 <= 1.5 * way_m**2 * away_s * self.slow_ramp_m_per_s(now_s)
-        if abs(error_m) <= TAKEN_BACK * self.change_m:
+        if abs(error_m) <= TAKEN_BACK * self.change_m or self.goes_far(way_m):
             return True
         coming_m = COMING * self.change_m
         if self.trend * error_m < 0.0:
