@@ -71,7 +71,7 @@ from config.extended_valve import Inverse
 from config.valve_file import ValveParameters
 
 Memory = npt.NDArray[np.float64]
-Guess = Literal["", "lowest", "swept", "quantum", "delay"]
+Guess = Literal["", "lowest", "swept", "quantum", "delay", "lag"]
 
 EVERYWHERE = ("t", "x", "v", "p", "q", "z")
 PLACES: Mapping[str, tuple[str, ...]] = {
@@ -121,8 +121,8 @@ class Parameter:
     given: bool = False
     """Read from a drawing or a data sheet: a fit leaves it at its start."""
     guess: Guess = ""
-    """What a record suggests for it, "lowest", "swept", "quantum" or "delay": a fit begins there too. Searches that
-    begin elsewhere would not find it."""
+    """What a record suggests for it, "lowest", "swept", "quantum", "delay" or "lag": a fit begins there too. Searches
+    that begin elsewhere would not find it."""
 
     def starts_for(self, valve: ValveParameters) -> tuple[float, ...]:
         """Return where a fit may start on this valve; what lies beyond the range stands at its end."""

@@ -30,7 +30,7 @@ class Parameters(NamedTuple):
     """T."""
 
     time_constant_s: Annotated[
-        float, Parameter("time constant", 0.0, 60.0, off=0.0, starts=(0.005, 0.02, 0.05, 0.2, 1.0))
+        float, Parameter("time constant", 0.0, 60.0, off=0.0, starts=(0.005, 0.02, 0.05, 0.2, 1.0), guess="lag")
     ]
 
 

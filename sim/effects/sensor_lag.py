@@ -30,7 +30,7 @@ class Parameters(NamedTuple):
     """T."""
 
     time_constant_s: Annotated[
-        float, Parameter("time constant", 0.0, 60.0, off=0.0, starts=(0.003, 0.01, 0.03, 0.1, 0.5))
+        float, Parameter("time constant", 0.0, 60.0, off=0.0, starts=(0.003, 0.01, 0.03, 0.1, 0.5), guess="lag")
     ]
 
 

@@ -7,6 +7,7 @@ that no effect makes a valve worse.
 
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass, replace
+from functools import partial
 
 from config.arguments import kinds_held
 from config.errors import InputError
@@ -22,7 +23,15 @@ from workbench.fit.likelihood import Likelihood
 from workbench.fit.minimiser import End, begun, derivatives, ended
 from workbench.fit.onsets import with_onsets
 from workbench.fit.problem import Problem, problem
-from workbench.fit.starts import Origin, base_starts, landed_start, near_start, swinging_starts, with_strengths
+from workbench.fit.starts import (
+    Origin,
+    base_starts,
+    exchanged,
+    landed_start,
+    near_start,
+    swinging_starts,
+    with_strengths,
+)
 from workbench.fit.threads import linear_algebra_alone, on_threads
 from workbench.model.parameters import DEFAULT, Parameter
 from workbench.model.sampling import DYNAMIC, MOST_WITH_INERTIA, Motion, Sampling
@@ -193,7 +202,8 @@ def begun_trial(
     searches: list[Callable[[], End]] = [lambda: ended(like, off, base.onsets_s, coarsely=True)]
     if base.cost > AT_THE_NOISE * 0.5 * base.count:
         afar = landed_start(like, added, [fitted, Origin(sheet)], points)
-        searches.append(lambda: _from_afar(like, afar, added, points, coarsely=True))
+        chosen = partial(with_strengths, like, added, points=points)
+        searches.append(lambda: _from_afar(like, afar, chosen, coarsely=True))
     else:
         near = near_start(like, added, fitted, points)
         searches.append(lambda: ended(like, near, base.onsets_s, coarsely=True))
@@ -203,11 +213,19 @@ def begun_trial(
 
 @linear_algebra_alone()
 def finished(of: Problem, trial: Trial) -> Fit:
-    """Search to the end from the best valley of a trial, and from the next best if that leaves something."""
+    """Search to the end from the best valley of a trial; if that leaves something, from others.
+
+    These are the next best, and the best with its lags in the other order.
+    """
     like, (first, *others) = trial.like, trial.valleys
     ends = [_settled(like, ended(like, first.z, first.onsets_s))]
-    if not at_the_noise(like, ends[0].cost) and others and others[0].cost < NEAR * first.cost:
-        ends.append(_settled(like, ended(like, others[0].z, others[0].onsets_s)))
+    if not at_the_noise(like, ends[0].cost):
+        if others and others[0].cost < NEAR * first.cost:
+            ends.append(_settled(like, ended(like, others[0].z, others[0].onsets_s)))
+        other_order = exchanged(like, min(ends, key=lambda each: each.cost).z)
+        if other_order is not None:
+            onsets_s, _ = with_onsets(like, like.theta(other_order))
+            ends.append(ended(like, other_order, onsets_s))
     return _best(of, like, ends)
 
 
@@ -262,17 +280,12 @@ def _scale(base: Fit, known: ValveParameters) -> ValveParameters:
 
 
 def _from_afar(
-    like: Likelihood,
-    z: Vector,
-    added: Sequence[Parameter] = (),
-    points: Sequence[tuple[float, ...]] = (),
-    *,
-    coarsely: bool = False,
+    like: Likelihood, z: Vector, chosen: Callable[[Vector], Vector] | None = None, *, coarsely: bool = False
 ) -> End:
     """Search from a place of which nothing is known: landings first, then what acts in time, onsets, and all."""
     landed = begun(like, z)
-    if added:
-        landed = with_strengths(like, added, landed, points)
+    if chosen:
+        landed = chosen(landed)
     onsets_s, _ = with_onsets(like, like.theta(landed), rounds=COARSE_ROUNDS if coarsely else None)
     return ended(like, landed, onsets_s, coarsely=coarsely)
 

@@ -9,7 +9,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from sim.composition import COULOMB, STATIC, VISCOUS
+from sim.composition import COULOMB, SPRING, STATIC, VISCOUS
 from sim.karnopp import Vector
 from workbench.fit.guesses import guessed_values
 from workbench.fit.likelihood import Groups, Likelihood, with_static
@@ -63,6 +63,22 @@ def with_strengths(
     """
     theta = like.theta(z)
     return _likeliest(like, [theta, *_strewn(like, added, Origin(theta), points)], like.run.first_onsets_s())
+
+
+def exchanged(like: Likelihood, z: Vector) -> Vector | None:
+    """Return coordinates with a lag and the stem's own time, F_v / k_s, exchanged; None of a valve without a lag.
+
+    The stem follows its force as a lag does, and two lags one after another come to the same in either order, but where
+    friction ends a slide: each order is a valley.
+    """
+    lags = [each for each in like.parameters if each.guess == "lag"]
+    theta = like.theta(z)
+    if len(lags) != 1 or theta[SPRING] == 0.0:
+        return None
+    lag_s = float(theta[lags[0].index])
+    theta[lags[0].index] = theta[VISCOUS] / theta[SPRING]
+    theta[VISCOUS] = lag_s * theta[SPRING]
+    return like.coordinates(theta)
 
 
 def _likeliest(like: Likelihood, thetas: Iterable[Vector], onsets_s: Vector) -> Vector:
