@@ -31,7 +31,7 @@ class Parameters(NamedTuple):
         float,
         Parameter("growth after a long rest", 0.0, 1e6, off=0.0, starts=(0.02, 0.05, 0.15, 0.5), scale="coulomb_n"),
     ]
-    time_constant_s: Annotated[float, Parameter("time constant", 1e-3, 1e6, starts=(0.1, 1.0, 10.0))]
+    time_constant_s: Annotated[float, Parameter("time constant", 1e-3, 1e6, starts=(0.1, 0.5, 2.0, 5.0, 20.0))]
 
 
 def start(t: float, z: Memory) -> None:

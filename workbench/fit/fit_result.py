@@ -21,10 +21,10 @@ from workbench.compare.measures import fit_percent
 from workbench.data.noise_floor import told
 from workbench.data.record import Record, ready
 from workbench.fit.fitted_parameter import Fitted, draw_parameters, parameter_columns, parameter_table
-from workbench.fit.likelihood import Groups, Likelihood, soft
+from workbench.fit.likelihood import Groups, Likelihood, Rows, soft
 from workbench.fit.minimiser import End
 from workbench.fit.problem import Problem
-from workbench.fit.uncertainty import Combination, Uncertainty, uncertainty
+from workbench.fit.uncertainty import RISE_95, Combination, Uncertainty, uncertainty
 from workbench.model.free_run import FreeRun
 from workbench.model.parameters import Parameter
 from workbench.model.sampling import DYNAMIC, Sampling
@@ -219,29 +219,41 @@ def _as_runs_freely(like: Likelihood, end: End, determined: Uncertainty) -> End:
     run = FreeRun(like.composition, like.record, from_pressure=like.from_pressure, by=like.by)
     seen_m = np.where(like.record.valid, like.record.position_m, np.nan)
 
-    def placed(value: float) -> Vector:
+    def placed(value: np.float64) -> Vector:
         z = end.z.copy()
         z[i] = value
         return z
 
-    trials = [end.z, *(placed(float(value)) for value in open_)]
+    trials = [end.z, *(each for each in map(placed, open_) if _as_likely(like, end, each))]
     errors = [np.nanmean((run.position_m(like.theta(z)) - seen_m) ** 2) for z in trials]
     best = trials[int(np.nanargmin(errors))] if np.isfinite(errors).any() else end.z
     groups = like.at(like.theta(best), end.onsets_s)
     return replace(end, z=best, groups=groups, cost=like.cost(groups.whole))
 
 
-def terms(like: Likelihood, groups: Groups, moved: Vector | None = None) -> Terms:
+def _as_likely(like: Likelihood, end: End, z: Vector) -> bool:
+    """Whether break-aways leave other coordinates as open as those of an end."""
+    groups = like.at(like.theta(z), end.onsets_s)
+    return like.cost(groups.whole) <= end.cost + RISE_95
+
+
+def terms(like: Likelihood, groups: Groups, rest_of: Rows | None = None, moved: Vector | None = None) -> Terms:
     """Return what the residuals say, kind by kind; and how far the parameters had moved for them, in deviations.
 
-    Samples in motion, and blocks at rest, that hang together count for fewer; landings and break-aways are as many as
-    they are.
+    Samples in motion that hang together count for fewer; landings and break-aways are as many as they are. A rest is
+    one witness, however long: one that a model gets wrong is one event.
+
+    Args:
+        like: whose residuals they are.
+        groups: all of them, or those of some moves.
+        rest_of: the rest of each block, where they are some, (blocks,).
+        moved: how far the parameters had to go, in deviations.
     """
     scale = like.weights.soft
     return Terms(
         _term(groups.motion, scale, independent_share(groups.motion)),
         _term(groups.landings, scale, 1.0),
-        _term(groups.rests, scale, independent_share(groups.rests)),
+        _rests(groups.rests, like.layout.rest_of if rest_of is None else rest_of, scale),
         _term(groups.break_aways, scale, 1.0),
         _term(np.empty(0) if moved is None else moved, scale, 1.0),
     )
@@ -249,6 +261,15 @@ def terms(like: Likelihood, groups: Groups, moved: Vector | None = None) -> Term
 
 def _term(r: Vector, scale: float, share: float) -> Term:
     return Term(share * r.size, max(1.0, 2.0 * float(soft(r, scale).mean())) if r.size else 1.0)
+
+
+def _rests(r: Vector, rest_of: Rows, scale: float) -> Term:
+    """Return the term of rests: the geometric mean of the mean squares of each."""
+    if not r.size:
+        return NO_TERM
+    _, of = np.unique(rest_of, return_inverse=True)
+    squares = np.bincount(of, 2.0 * soft(r, scale)) / np.bincount(of)
+    return Term(float(squares.size), float(np.exp(np.mean(np.log(np.maximum(squares, 1.0))))))
 
 
 def _fitted(like: Likelihood, end: End, determined: Uncertainty, i: int) -> Fitted:

@@ -11,7 +11,7 @@ First factor. A simulation is told the moves (`workbench.model.told_run`). With 
 sigma the noise, tau = `landing` sigma. Second factor. F_s lies between L_bears, what a rest bore, and L_breaks, what
 broke it loose:
 
-    r_k = max(L_bears - F_s, F_s - L_breaks, 0) / L_0     L_0 = `break_away` of the sliding friction on the data sheet
+    r_k = max(L_bears - F_s, F_s - L_breaks, 0) / L_0     L_0 = `break_away` k_s sigma, k_s as on the data sheet
 
 The cost is the soft L1 of all, s^2 (sqrt(1 + (r / s)^2) - 1) summed, s = `soft`. It is smooth in every parameter:
 nothing in it asks whether a slip happened.
@@ -42,8 +42,10 @@ class Weights:
     """Samples of a block of a rest: at 200 Hz a lag of the sensor shows in blocks of a tenth of a second."""
     landing: float = 0.2
     """tau, in sigma: two integrations of one law end a slide that far apart, however long its rest is averaged."""
-    break_away: float = 0.01
-    """Of F_c on the data sheet, to which a break-away tells F_s: an onset is known to a part of a sample."""
+    break_away: float = 2.0
+    """Of what the spring makes of sigma: a break-away tells F_s no better than the record tells where the stem is,"""
+    load: float = 1e-3
+    """nor than this share of F_c: the laws of two integrations differ by as much."""
     soft: float = 5.0
     """Residuals beyond which one counts by its amount alone: a wild sample is no evidence."""
     beside: int = 3

@@ -106,7 +106,8 @@ def problem(
     require_units(record, valve)
     told = told_moves(record)
     _require_motion(record, told)
-    return Problem(record, told, by or sampling(record, valve), from_pressure, WEIGHTS.break_away * valve.coulomb_n)
+    load_n = max(WEIGHTS.break_away * valve.spring_n_per_m * record.scale_m, WEIGHTS.load * valve.coulomb_n)
+    return Problem(record, told, by or sampling(record, valve), from_pressure, load_n)
 
 
 def _require_motion(record: Record, told: Sequence[ToldMove]) -> None:

@@ -26,7 +26,7 @@ from sim.karnopp import Vector
 from workbench.data.held_out import HELD_OUT_RECORDING, Part, Split, residual_m
 from workbench.fit.fit_result import Fit, Terms, terms
 from workbench.fit.fitting import AT_THE_NOISE, at_the_noise, problem_of
-from workbench.fit.likelihood import Groups, Likelihood
+from workbench.fit.likelihood import Groups, Likelihood, Rows
 from workbench.fit.minimiser import ended
 from workbench.fit.onsets import motion_rows, with_onsets
 from workbench.model.sampling import NO_LANDING
@@ -122,7 +122,7 @@ def block_errors(fit: Fit, split: Split) -> BlockErrors:
         structure=max(
             structure(part.record, told.error_m, negligible_m) for part, told in ((train, fitted), (test, held_out))
         ),
-        held_out=terms(held_out.like, _of_counted(held_out.like, held_out.groups, test), held_out.moved),
+        held_out=terms(held_out.like, *_of_counted(held_out.like, held_out.groups, test), held_out.moved),
     )
 
 
@@ -174,20 +174,21 @@ def _counted(like: Likelihood, part: Part) -> list[bool]:
     return [bool(part.counted[each.after]) for each in like.moves]
 
 
-def _of_counted(like: Likelihood, groups: Groups, part: Part) -> Groups:
-    """Return the residuals of the moves that count, and of the rests they end in."""
+def _of_counted(like: Likelihood, groups: Groups, part: Part) -> tuple[Groups, Rows]:
+    """Return the residuals of the moves that count, and of the rests they end in; and the rest of each block."""
     counted = _counted(like, part)
     if all(counted):
-        return groups
+        return groups, like.layout.rest_of
     moves = [k for k, counts in enumerate(counted) if counts]
     rests = [like.layout.rest_after[k] for k in moves if like.layout.rest_after[k] >= 0]
-    rows = motion_rows(like)
-    return Groups(
+    rows, blocks = motion_rows(like), np.isin(like.layout.rest_of, rests)
+    found = Groups(
         np.concatenate([np.empty(0), *(groups.motion[slice(*rows[k])] for k in moves)]),
         groups.landings[rests],
-        groups.rests[np.isin(like.layout.rest_of, rests)],
+        groups.rests[blocks],
         groups.break_aways[np.isin(like.broken, moves)],
     )
+    return found, like.layout.rest_of[blocks]
 
 
 def event_logs(fit: Fit, part: Part) -> Column:
