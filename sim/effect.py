@@ -196,6 +196,11 @@ class Effect:
         return "h" in self.functions.get("advance", ())
 
     @property
+    def hides_motion(self) -> bool:
+        """Whether the sensor may stay while the stem moves: its memory is of where the stem was, not of when."""
+        return "sensor" in self.functions and self.memory > 0 and not self.in_time
+
+    @property
     def written(self) -> str:
         """How a valve file names it: an own effect by its path."""
         return self.name if self.path.parent == SHIPPED else str(self.path)

@@ -29,6 +29,7 @@ from workbench.fit.starts import (
     exchanged,
     landed_start,
     near_start,
+    strewn_starts,
     swinging_starts,
     with_strengths,
 )
@@ -200,7 +201,10 @@ def begun_trial(
         sheet[i] = getattr(valve.valve, name)
     off = like.coordinates(fitted.theta)
     searches: list[Callable[[], End]] = [lambda: ended(like, off, base.onsets_s, coarsely=True)]
-    if base.cost > AT_THE_NOISE * 0.5 * base.count:
+    if like.run.hidden:  # friction stands in for a play where slides land: landings do not choose its width
+        begins = strewn_starts(like, added, fitted, points)
+        searches += [lambda z=z: _from_afar(like, z, coarsely=True) for z in begins]  # type: ignore[misc]
+    elif base.cost > AT_THE_NOISE * 0.5 * base.count:
         afar = landed_start(like, added, [fitted, Origin(sheet)], points)
         chosen = partial(with_strengths, like, added, points=points)
         searches.append(lambda: _from_afar(like, afar, chosen, coarsely=True))

@@ -29,6 +29,8 @@ class OnsetSearch:
     """Of parabolas: the bottom takes two, a step that is taken back two more."""
     first_step: float = 0.5
     """Periods that an onset moves at most in a round."""
+    unseen_step: float = 10.0
+    """The same where the stem may move before it is seen to: it has left by as much as its play takes."""
     shorter: float = 0.3
     """Factor on that where a step led higher."""
 
@@ -48,7 +50,7 @@ def with_onsets(like: Likelihood, theta: Vector, rounds: int | None = None) -> t
     near = np.array(costs) <= np.min(costs, axis=0) + SEARCH.as_good
     onsets_s = np.choose(np.argmax(near, axis=0), tried) if len(like.moves) else np.empty(0)
     groups = like.at(theta, onsets_s)
-    reach = np.full(onsets_s.size, SEARCH.first_step)
+    reach = np.full(onsets_s.size, SEARCH.unseen_step if like.run.hidden else SEARCH.first_step)
     for _ in range((rounds or SEARCH.rounds) if onsets_s.size else 0):
         go_on()
         slopes = by_onsets(like, theta, onsets_s)
@@ -65,13 +67,15 @@ def with_onsets(like: Likelihood, theta: Vector, rounds: int | None = None) -> t
 
 
 def _cost_by_move(like: Likelihood, groups: Groups) -> Vector:
-    """Return the cost of the motion and the landing of each move, (moves,)."""
+    """Return the cost of the motion and the landing of each move, (moves,); of unseen ones with the break-away's."""
     motion = np.concatenate([[0.0], np.cumsum(soft(groups.motion, like.weights.soft))])
     landed = soft(groups.landings, like.weights.soft)
     costs = np.zeros(len(like.moves))
     for k, (first, end) in enumerate(motion_rows(like)):
         rest = like.layout.rest_after[k]
         costs[k] = motion[end] - motion[first] + (landed[rest] if rest >= 0 else 0.0)
+    if like.run.hidden:
+        costs[like.broken] += soft(groups.break_aways, like.weights.soft)
     return costs
 
 

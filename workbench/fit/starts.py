@@ -117,6 +117,13 @@ def landed_start(
     return best
 
 
+def strewn_starts(
+    like: Likelihood, added: Sequence[Parameter], fitted: Origin, points: Sequence[tuple[float, ...]] = ()
+) -> list[Vector]:
+    """Return coordinates beside a fit with each of the strengths."""
+    return [like.coordinates(theta) for theta in _strewn(like, added, fitted, points)]
+
+
 def _strewn(
     like: Likelihood, added: Sequence[Parameter], origin: Origin, points: Sequence[tuple[float, ...]]
 ) -> Iterator[Vector]:

@@ -95,6 +95,8 @@ class ToldRun:
         self.free = FreeRun(composition, seen, from_pressure=from_pressure, by=DYNAMIC)
         self._composition = self.free._composition
         self._tell = self._composition.told.tell
+        self.hidden = any(each.hides_motion for each in self._composition.effects)
+        """Whether the stem may move before it is seen to."""
         self._parts = [
             _part(each, [k for k, move in enumerate(told) if move.segment == number], told, record)
             for number, each in enumerate(self.free._segments)
@@ -116,11 +118,14 @@ class ToldRun:
         return np.array([0.5 * (time_s[each.before] + time_s[each.before + 1]) for each in self.moves])
 
     def bounds_s(self, periods: float) -> tuple[Vector, Vector]:
-        """Return between which times the onsets lie: so many periods about where they show, within their rests."""
+        """Return between which times the onsets lie: so many periods about where they show, within their rests.
+
+        A stem whose sensor may stay while it moves has left at any time of the rest.
+        """
         first, period_s, time_s = self.first_onsets_s(), self.record.period_s, self.record.time_s
         earliest = np.array([time_s[each.rested_from] for each in self.moves])
         latest = np.array([time_s[max(each.after - 1, each.before)] for each in self.moves])
-        low = np.maximum(first - periods * period_s, earliest)
+        low = earliest if self.hidden else np.maximum(first - periods * period_s, earliest)
         return np.minimum(low, first - 0.5 * period_s), np.maximum(
             np.minimum(first + periods * period_s, latest), first + 0.5 * period_s
         )
