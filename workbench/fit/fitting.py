@@ -34,7 +34,7 @@ from workbench.fit.starts import (
     with_strengths,
 )
 from workbench.fit.threads import linear_algebra_alone, on_threads
-from workbench.model.parameters import DEFAULT, Parameter
+from workbench.model.parameters import DEFAULT
 from workbench.model.sampling import DYNAMIC, MOST_WITH_INERTIA, Motion, Sampling
 from workbench.model.told_run import told_moves
 
