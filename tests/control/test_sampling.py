@@ -1,6 +1,7 @@
 """When a device samples is found out by the excitation, whatever `[device] sampling` says."""
 
 from dataclasses import dataclass, field, replace
+from itertools import product
 from typing import Any
 
 import pytest
@@ -13,6 +14,7 @@ from positioner.control.settings import Settings
 from positioner.virtual.virtual_cycle import identified, virtual_cycle
 from tests.cases import few_always
 from tests.control.other_plant import SEED_LIKE, OtherPlant
+from tests.other_device import Parameters
 
 PROMPT = replace(SEED_LIKE, lag_s=1e-4)
 SLOPE, FRICTION_PA = PROMPT.spring_n_per_m / PROMPT.area_m2, PROMPT.coulomb_n / PROMPT.area_m2
@@ -61,7 +63,24 @@ class TakenLate:
         self._shown_pa = self.plant.pressure_pa
 
 
-def excited(plant: OtherPlant, said: Sampling, true: Sampling, period_s: float = 1e-3) -> Decision:
+class OnItsOwnClock(OtherPlant):
+    """A device that samples when it likes: a command comes at a share of its period, and acts at once."""
+
+    def __init__(self, parameters: Parameters, period_s: float, share: float) -> None:
+        self._waits_s = share * period_s
+        super().__init__(parameters, period_s, at_pu=0.0, noise_std_m=1e-5)
+
+    def tick(self, command_pa: float) -> None:
+        self.stem.advance(self.command_pa, self._waits_s)
+        self.command_pa = command_pa
+        self.stem.advance(command_pa, self._period_s - self._waits_s)
+        self.sample_counter += 1
+        self._measure()
+
+
+def excited(
+    plant: OtherPlant, said: Sampling, true: Sampling, period_s: float = 1e-3, *, held: bool = True
+) -> Decision:
     """Return what S3 by a sine leaves."""
     device: Any = OnRequest(plant) if true is AFTER else plant
     file = DaemonFile.model_validate(
@@ -69,7 +88,7 @@ def excited(plant: OtherPlant, said: Sampling, true: Sampling, period_s: float =
             "valve": {"stroke_m": PROMPT.stroke_m},
             "cycle": {"pace": "device", "period_s": period_s},
             "control": {"law": "seed"},
-            "identification": {"derivative_window_s": max(0.05, 10 * period_s)},
+            "identification": {"derivative_window_s": max(0.05, 10 * period_s), "pressure_held": held},
         }
     )
     settings = Settings.of(file)
@@ -107,6 +126,29 @@ def test_it_is_found_out_and_what_is_applied_is_as_sure_as_it_says(
     assert estimates.sampling is true
     assert abs(-estimates.b_over_c.value - SLOPE) < DEVIATIONS * estimates.b_over_c.std
     assert abs(-estimates.k_over_c.value - FRICTION_PA) < DEVIATIONS * estimates.k_over_c.std
+
+
+@pytest.mark.parametrize(
+    ("lag_s", "period_s", "share", "held"),
+    few_always(
+        [
+            (1e-3, 1e-3, 0.5, True),
+            (1e-4, 5e-3, 0.8, False),
+            *product((1e-4, 1e-3, 5e-3), (1e-3, 5e-3), (0.2, 0.5, 0.8), (True, False)),
+        ],
+        2,
+    ),
+)
+def test_a_device_on_its_own_clock_is_known_as_well_as_is_said_or_refused(
+    lag_s: float, period_s: float, share: float, held: bool
+) -> None:
+    """Where a command acts between two samples, nobody knows; said to be linear between them, it may be held."""
+    device = OnItsOwnClock(replace(PROMPT, lag_s=lag_s), period_s, share)
+    decision = excited(device, BEFORE, BEFORE, period_s, held=held)
+    if decision.applied.ratios is not None:
+        estimates = decision.estimates
+        assert abs(-estimates.b_over_c.value - SLOPE) < DEVIATIONS * estimates.b_over_c.std
+        assert abs(-estimates.k_over_c.value - FRICTION_PA) < DEVIATIONS * estimates.k_over_c.std
 
 
 def test_where_neither_fits_the_refusal_names_it() -> None:
