@@ -394,6 +394,11 @@ class DaemonFile(Schema):
         return self
 
     @property
+    def stale_after_s(self) -> float:
+        """After how long a measurement that is not renewed is stale, s: never before so many cycles were lost."""
+        return max(self.safety.stale_after_s, self.safety.lost_after_cycles * self.cycle.period_s)
+
+    @property
     def longest_unattended_s(self) -> float:
         """For how long the device may be without a command before the daemon counts as having stood still.
 

@@ -65,7 +65,7 @@ class Settings:
                 stroke_m=file.valve.stroke_m,
                 travel_margin=safety.travel_margin,
                 lost_after_cycles=safety.lost_after_cycles,
-                stale_after_s=safety.stale_after_s,
+                stale_after_s=file.stale_after_s,
                 heartbeat_timeout_s=safety.heartbeat_timeout_s,
                 # A device may round the command that it is told to its own digits.
                 restart_tolerance_pa=max(1e-3 * file.pressure.maximum_pa, file.device.command_step_pa),

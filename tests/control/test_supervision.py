@@ -6,9 +6,11 @@ from dataclasses import replace
 import pytest
 
 from config.codes import Fault, Mode, Quality
+from config.daemon_file import DaemonFile
 from config.quantities import DeviceStatus
 from positioner.control.requests import Requests
 from positioner.control.sample import Sample
+from positioner.control.settings import Settings
 from positioner.control.supervision import Limits, SupervisionMemory, supervise, usable
 
 LIMITS = Limits(
@@ -66,6 +68,23 @@ def test_a_dead_line_that_is_slower_than_staleness_is_no_reply() -> None:
 def test_two_lost_replies_with_a_good_one_between_are_none() -> None:
     lost = good(0.01)._replace(quality=Quality.LOST)
     assert faults(watched([good(0.0), lost, lost, good(0.03), lost, lost], AUTOMATIC)) == [Fault.NONE] * 6
+
+
+@pytest.mark.parametrize("period_s", [1e-3, 0.05, 0.1, 0.4])
+@pytest.mark.parametrize("quality", [Quality.LOST, Quality.REPEATED])
+def test_by_a_file_that_says_nothing_of_it_a_reply_or_two_that_are_lost_are_no_fault(
+    quality: Quality, period_s: float
+) -> None:
+    """At 100 ms the first one was: it was longer ago than 0.1 s."""
+    tables = {"valve": {"stroke_m": 0.1}, "cycle": {"period_s": period_s}}
+    limits = Settings.of(DaemonFile.model_validate(tables)).limits
+    memory = SupervisionMemory()
+    for n, each in enumerate((Quality.GOOD, quality, quality, Quality.GOOD, quality, quality)):
+        sample = good(1.001 * period_s * n)._replace(quality=each)
+        memory = supervise(memory, sample, 50e3, AUTOMATIC, limits, good=usable(sample, limits))
+        assert memory.fault is Fault.NONE
+    third = good(period_s * 7 + 0.11)._replace(quality=quality)
+    assert supervise(memory, third, 50e3, AUTOMATIC, limits, good=False).fault is not Fault.NONE
 
 
 def test_repeated_samples_turn_stale() -> None:
