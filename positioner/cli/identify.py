@@ -46,14 +46,16 @@ def run(arguments: argparse.Namespace) -> int:
 def _report(dcs: "Dcs", problem: str | None) -> int:
     from config.codes import Ne107Cause, Refusal, Sampling
     from config.registers import BY_NAME, ESTIMATED
+    from positioner.estimation.estimates import refusals_said
 
+    reasons = {}
     print(f"{'':12} {'estimate':>14} {'std':>12} unit")
     for name in (*ESTIMATED, "static_slope", "static_up", "static_down"):
         now = dcs.get_all(f"{name}_e", f"{name}_std", f"{name}_reason")
-        reason = Refusal(int(now[f"{name}_reason"]))
-        note = "" if reason is Refusal.VALID else f"  refused: {reason.text}"
-        unit = BY_NAME[f"{name}_e"].unit
-        print(f"{name:12} {now[f'{name}_e']:14.6g} {now[f'{name}_std']:12.3g} {unit}{note}")
+        reasons[name] = Refusal(int(now[f"{name}_reason"]))
+        if reasons[name] is Refusal.VALID:
+            print(f"{name:12} {now[f'{name}_e']:14.6g} {now[f'{name}_std']:12.3g} {BY_NAME[f'{name}_e'].unit}")
+    print(*refusals_said(reasons), sep="\n")
     if problem is not None:
         print(f"\nnot applied: {problem}; the law keeps what it had")
         return 1

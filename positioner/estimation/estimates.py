@@ -1,5 +1,6 @@
 """What the identification hands on: each value with its standard deviation, and the reason if it is not valid."""
 
+from collections.abc import Mapping
 from dataclasses import dataclass, replace
 from enum import Enum
 from math import nan
@@ -110,3 +111,15 @@ def no_estimates(reason: Refusal) -> Estimates:
     """Return estimates without values, for a reason."""
     nothing = no_estimate(reason)
     return Estimates(nothing, nothing, nothing, nothing, nothing, nothing, progress=0.0, time_s=nan, breakaway=nothing)
+
+
+def refusals_said(reasons: Mapping[str, Refusal]) -> list[str]:
+    """Return a line for each reason for which estimates, by their names, are refused.
+
+    >>> refusals_said({"a": Refusal.NOT_ASKED, "b": Refusal.VALID, "c": Refusal.NOT_ASKED})
+    ['refused (a, c): this estimate was not asked for']
+    """
+    refused = dict.fromkeys(reason for reason in reasons.values() if reason is not Refusal.VALID)
+    return [
+        f"refused ({', '.join(name for name in reasons if reasons[name] is each)}): {each.text}" for each in refused
+    ]

@@ -17,7 +17,7 @@ from config.results.block import Block, Table
 from config.results.result import Result
 from positioner.estimation.array import Array
 from positioner.estimation.batch import BatchResult, BatchSettings, identify
-from positioner.estimation.estimates import Estimate, Estimates
+from positioner.estimation.estimates import Estimate, Estimates, refusals_said
 from positioner.estimation.landings.recording_landings import recording_landings
 from positioner.estimation.landings.static_identification import StaticIdentification
 from positioner.estimation.landings.static_law import StaticLaw
@@ -82,8 +82,9 @@ class RecordingEstimates(Result):
         noise = "unknown" if found.noise_std_m is None else f"{found.noise_std_m:.3g} m"
         stamps = "; time stamps jitter: samples taken as even" if found.evened else ""
         rows = [
-            (name, f"{each.value:.6g}", f"{each.std:.3g}", unit, "" if each.valid else f"refused: {each.reason.text}")
+            (name, f"{each.value:.6g}", f"{each.std:.3g}", unit)
             for name, (each, unit) in self.by_name.items()
+            if each.valid
         ]
         quality = (
             []
@@ -93,7 +94,8 @@ class RecordingEstimates(Result):
         return [
             f"{self.samples} samples, {found.segments} motions fitted, {found.left_out} left out",
             f"noise {noise}; pressure taken as {found.pressure} between samples{stamps}",
-            Table(("", "value", "std", "unit", ""), rows),
+            *([Table(("", "value", "std", "unit"), rows)] if rows else []),
+            *refusals_said({name: each.reason for name, (each, _) in self.by_name.items()}),
             *quality,
             f"{self.static_law.landings} landings"
             + (f"; they lie {self.static_law.residual_m:.3g} m off the static law" if self.static_law.valid else ""),

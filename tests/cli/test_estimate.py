@@ -50,7 +50,9 @@ def test_what_does_not_move_is_refused_with_its_reason(tmp_path: Path, capsys: p
         "valid": False,
         "reason": "the stem has not been seen to move yet",
     }
-    assert "refused: the stem has not been seen to move yet" in capsys.readouterr().out
+    out_said = capsys.readouterr().out
+    assert "refused (a, b, c, k, b_over_c, k_over_c, F_s/A): the stem has not been seen to move yet" in out_said
+    assert out_said.count("has not been seen to move yet") == 1
 
 
 def test_bad_input_is_one_line(tmp_path: Path, swung: Run, capsys: pytest.CaptureFixture[str]) -> None:
