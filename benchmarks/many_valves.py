@@ -1,6 +1,6 @@
 """How many valves one daemon serves: 200 at 10 Hz and 64 at 100 Hz, and what each costs.
 
-    python -m benchmarks.many_valves [--valves 64 --rate-hz 100] [--seconds 20]
+    python -m benchmarks.many_valves [--valves 64 --rate-hz 100] [--seconds 20] [--processes 1]
 
 The devices are one process, which answers the shipped map from words that count up, so that nearly all that is used of
 the processors is the daemon's. Figures: periods missed, per cent; processor time a cycle, us, and how many times that
@@ -100,19 +100,21 @@ class Devices:
         return self._layout.pack([each.raw(now.get(name, 0.0)) for name, each in self._places.items()])
 
 
-def report(goals: Sequence[tuple[int, float]] = GOALS, seconds: float = SECONDS) -> list[str]:
+def report(
+    goals: Sequence[tuple[int, float]] = GOALS, seconds: float = SECONDS, processes: int | None = None
+) -> list[str]:
     """Return a line for each number of valves and rate."""
     lines = [
         f"{'valves':>6}{'Hz':>6}{'missed %':>10}{'us a cycle':>12}{'in memory':>11}{'processor %':>13}{'threads':>9}"
         f"{'ends after s':>14}{'others load':>13}  faults"
     ]
     for valves, rate_hz in goals:
-        lines.append(measured(valves, rate_hz, seconds))
+        lines.append(measured(valves, rate_hz, seconds, processes))
     return lines
 
 
-def measured(valves: int, rate_hz: float, seconds: float) -> str:
-    """Run so many valves for so long and return the line."""
+def measured(valves: int, rate_hz: float, seconds: float, processes: int | None = None) -> str:
+    """Run so many valves for so long and return the line; None: among as many processes as the daemon chooses."""
     with tempfile.TemporaryDirectory() as folder, ExitStack() as on_exit:
         here = [sys.executable, "-m", "benchmarks.many_valves", "--devices"]
         devices = subprocess.Popen(here, stdout=subprocess.PIPE, text=True)
@@ -120,7 +122,8 @@ def measured(valves: int, rate_hz: float, seconds: float) -> str:
         on_exit.callback(devices.kill)
         assert devices.stdout is not None
         file = Path(folder, "many.toml")
-        file.write_text(_file(valves, rate_hz, int(devices.stdout.readline())))
+        shared = "" if processes is None else f"[service]\nprocesses = {processes}\n"
+        file.write_text(shared + _file(valves, rate_hz, int(devices.stdout.readline())))
         log = on_exit.enter_context(Path(folder, "log").open("w"))
         command = [sys.executable, "-m", "positioner.cli", "run", str(file)]
         daemon = subprocess.Popen(command, stdout=subprocess.PIPE, stderr=log, text=True)
@@ -191,11 +194,12 @@ def main(words: Sequence[str] | None = None) -> None:
     parser.add_argument("--valves", type=int)
     parser.add_argument("--rate-hz", type=float, default=10.0)
     parser.add_argument("--seconds", type=float, default=SECONDS)
+    parser.add_argument("--processes", type=int)
     given = parser.parse_args(words)
     if given.devices:
         Devices().serve()
     goals = ((given.valves, given.rate_hz),) if given.valves else GOALS
-    print(*report(goals, given.seconds), sep="\n", flush=True)
+    print(*report(goals, given.seconds, given.processes), sep="\n", flush=True)
 
 
 if __name__ == "__main__":

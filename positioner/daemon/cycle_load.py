@@ -2,9 +2,9 @@
 
     load = sum of c/T over the valves        c processor time of a cycle, T its period
 
-An interpreter uses one processor, however many there are: a daemon whose cycles need more shares its valves among
-processes, at most one a processor where its file says no number. c is that of the daemon's own cycle on a device in
-memory, which answers at once, times `ON_THE_WIRE`.
+An interpreter uses one processor, however many there are: a daemon whose cycles need more, or that has more lines than
+`MOST_LINES`, shares its valves among processes, at most one a processor where its file says no number. c is that of the
+daemon's own cycle on a device in memory, which answers at once, times `ON_THE_WIRE`.
 """
 
 import os
@@ -27,6 +27,9 @@ ON_THE_WIRE = 4.0
 `python -m benchmarks.many_valves` prints it: 4 to 5 beside others that use the same processors."""
 USABLE = 0.8
 """Of the processor: beyond it cycles wait for one another, and more than 1 % of the periods are missed."""
+MOST_LINES = 100
+"""Threads that cycle in one process: with 200 in one a cycle costs up to twice what it costs in two of 100 each, and
+more periods are missed (`python -m benchmarks.many_valves --processes 1`)."""
 IMPOSSIBLE = 2.0
 """Of the processor: no busy moment while it was measured makes so much of a load that fits."""
 BATCHES, CYCLES = 6, 40
@@ -42,6 +45,7 @@ class CycleLoad:
         fastest_s: the shortest period among them.
         cost_s: processor time of a cycle.
         share: of one processor; 1 is all of it.
+        lines: number of threads that cycle.
         processes: that may share them, each with a processor of its own.
     """
 
@@ -49,6 +53,7 @@ class CycleLoad:
     fastest_s: float
     cost_s: float
     share: float
+    lines: int = 1
     processes: int = 1
 
     @property
@@ -64,7 +69,7 @@ class CycleLoad:
     @property
     def needed(self) -> int:
         """How many processes they need, of those that there may be."""
-        return min(max(ceil(self.share / USABLE), 1), self.processes)
+        return min(max(ceil(self.share / USABLE), ceil(self.lines / MOST_LINES), 1), self.processes)
 
     @property
     def said(self) -> str:
@@ -94,6 +99,7 @@ def cycle_load(files: Sequence[DaemonFile], cost_s: float | None = None) -> Cycl
         fastest_s=min(periods_s),
         cost_s=cost_s,
         share=share,
+        lines=len({each.device.line or each.valve.name for each in files}),
         processes=min(files[0].service.processes or processors(), processors()),
     )
 

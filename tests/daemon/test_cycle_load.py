@@ -57,6 +57,15 @@ def test_as_many_processes_as_the_cycles_need_and_no_more_than_processors(
     assert (load.needed, load.fits) == (needed, fits)
 
 
+def test_more_lines_than_one_process_takes_are_shared(monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr(module, "processors", lambda: 2)
+    for lines, needed in ((100, 1), (101, 2)):
+        named = [file(0.1).valve.model_copy(update={"name": f"V{each}"}) for each in range(lines)]
+        load = cycle_load([file(0.1).model_copy(update={"valve": each}) for each in named], cost_s=1e-4)
+        assert load is not None
+        assert load.needed == needed
+
+
 def test_a_cycle_on_this_machine_takes_some_ten_microseconds_to_a_millisecond_in_memory() -> None:
     cost_s = in_memory_s(file(0.01))
     assert 5e-6 < cost_s < 2e-3
