@@ -46,7 +46,7 @@ BREAKAGES = (
     Breakage(
         "a device that is operated locally stays where it is when it is given back",
         "positioner/control/controller.py",
-        "if sample.quality is Quality.GOOD and sample.status & NOT_READY:",
+        "if sample.quality is GOOD and sample.status & NOT_READY:",
         "if False:",
         "tests/control/test_controller.py::test_a_device_that_does_not_obey_stays_where_it_is_when_it_does_again",
     ),

@@ -87,6 +87,7 @@ class Workers:
         self, shares: Sequence[Share], counts: RequestCounts, tell: Callable[[Told], None], on_exit: ExitStack
     ) -> None:
         self._workers = [Worker(share, counts, tell) for share in shares]
+        self._looks = 0
         for each in self._workers:
             on_exit.callback(each.kill)
             each.start()
@@ -108,11 +109,12 @@ class Workers:
         wait([each.news for each in self._workers if each.news is not None], wait_s)
         for each in self._workers:
             each.look()
+        self._looks += 1
 
     @property
     def turns(self) -> list[int]:
-        """How often each has said that its cycles turn; one that is away has nothing that could stand."""
-        return [each.turns for each in self._workers]
+        """How often it was looked whether they stand: they are this process's to watch, and this one is others'."""
+        return [self._looks]
 
     def end(self, endings: Endings) -> None:
         """Tell all to end, and wait until they have."""
@@ -192,10 +194,11 @@ class Worker:
             if self._serves and self._process is not None and now_s - self._turned_s > stands_s:
                 log_event(log, logging.ERROR, "a worker's cycles stand", valves=self._names, pid=self._process.pid)
                 self._process.kill()
-        else:
-            self.turns += 1
-            if now_s >= self._again_s:
+        elif now_s >= self._again_s:
+            try:
                 self.start()
+            except OSError as error:  # no room for it: memory, descriptors, a disk
+                self._put_off(str(error))
 
     def ask(self, call: Call) -> Sequence[int]:
         """Return what the registers of a unit answer.
@@ -284,22 +287,25 @@ class Worker:
                 self.turns += 1
 
     def _note_the_end(self) -> None:
-        """Say that it has ended, and when it is started again."""
-        process, now_s = self._process, time.monotonic()
-        status = None
+        """Take note that it has ended."""
+        process, status = self._process, None
         if process is not None:
             process.kill()  # it has closed its end, so it ends, or is broken
             status = process.wait()
+        if not self._is_to_end:
+            self._put_off(str(self._fault) if self._fault is not None else f"status {status}")
+        self._forget()
+
+    def _put_off(self, reason: str) -> None:
+        """Say why it is away, and when it is started again."""
+        now_s = time.monotonic()
         if self._serves and now_s - self._begun_s > SERVED_LONG_S:
             self._failures = 0
         wait_s = min(FIRST_S * 2.0**self._failures, LONGEST_S)
         self._failures += 1
         self._again_s = now_s + wait_s
-        reason = str(self._fault) if self._fault is not None else f"status {status}"
-        if not self._is_to_end:
-            told = {"valves": self._names, "reason": reason, "started_again_after_s": wait_s}
-            log_event(log, logging.ERROR, "a worker has ended", **told)
-        self._forget()
+        told = {"valves": self._names, "reason": reason, "started_again_after_s": wait_s}
+        log_event(log, logging.ERROR, "a worker has ended", **told)
 
     def _forget(self) -> None:
         with self._asking:

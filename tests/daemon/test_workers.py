@@ -7,6 +7,7 @@ import json
 import os
 import signal
 import sqlite3
+import tempfile
 import time
 from collections.abc import Callable, Iterator
 from contextlib import ExitStack, closing
@@ -160,7 +161,7 @@ def test_one_whose_cycles_stand_is_killed_and_started_again(
 
             return looked
 
-        until(look(lambda: min(here.turns) > 0), "turns")
+        until(look(lambda: first.turns > 0 and second.turns > 0), "turns")
         pid = first._process.pid if first._process else 0
         os.kill(pid, signal.SIGSTOP)
         until(look(lambda: is_gone(pid)), "the end of the one that stands")
@@ -168,6 +169,12 @@ def test_one_whose_cycles_stand_is_killed_and_started_again(
         assert position_m(here, 2) is not None, "the other answers"
         until(look(lambda: position_m(here, 1) is not None), "its return")
         assert first._process is not None
+        monkeypatch.setattr(workers, "FIRST_S", 0.0)
+        with monkeypatch.context() as full:
+            full.setattr(tempfile, "TemporaryFile", Path(__file__, "no room").open)
+            os.kill(first._process.pid, signal.SIGKILL)
+            until(look(lambda: first._failures > 3), "starts that fail")
+        until(look(lambda: position_m(here, 1) is not None), "its return once there is room")
         assert second._failures == 0
 
 
