@@ -12,7 +12,7 @@ from config.codes import InhibitReason
 from positioner.control.laws.slides import transitions
 from positioner.control.laws.slides.slide_law import SlideLaw
 from positioner.control.laws.slides.slide_memory import SlideMemory
-from positioner.control.laws.slides.states import STATES, Idle, Out, Stuck, Waiting
+from positioner.control.laws.slides.states import STATES, Idle, Out, Presliding, Stuck, Waiting
 from positioner.control.laws.slides.transitions import TABLE
 from tests.control.scripted_stem import SETTINGS, SLOPE_PA_PER_M, STEP_S, STROKE_M, ScriptedStem, drawn_stems
 
@@ -107,16 +107,17 @@ def soft_stems(seed: int) -> Iterator[ScriptedStem]:
 
 
 def test_a_packing_that_gives_way_takes_small_moves_without_a_slide() -> None:
-    """Excursions go down by a tenth at least, and the stem ends as near."""
-    outs = Counter[str]()
-    for name, stems in (("stiff", drawn_stems(COUNT, seed=7)), ("soft", soft_stems(seed=7))):
-        for stem in islice(stems, 8):
-            for number, reference_m in enumerate(references(stem, 30)):
-                stem.now_s += 10.0 * 3 ** (number % 2)  # no ramp
-                stem.moved_to(reference_m)
-                assert abs(stem.position_m - reference_m) < 1e-3 * STROKE_M
-            outs[name] += sum(to is Out and before is not Out for before, to in stem.states)
-    assert outs["soft"] < 0.9 * outs["stiff"]
+    """Where it is tried the stem ends on its reference by that alone, in most moves."""
+    ways = Counter[tuple[type, type]]()
+    for stem in islice(soft_stems(seed=7), 8):
+        for number, reference_m in enumerate(references(stem, 30)):
+            stem.now_s += 10.0 * 3 ** (number % 2)  # no ramp
+            stem.moved_to(reference_m)
+            assert abs(stem.position_m - reference_m) < 1e-3 * STROKE_M
+        ways.update(stem.states)
+    begun = ways[Idle, Presliding] + ways[Out, Presliding]
+    assert begun > 30
+    assert ways[Presliding, Idle] > 0.8 * begun
 
 
 def test_every_rule_of_the_table_is_followed_and_no_other_way_is_gone(monkeypatch: pytest.MonkeyPatch) -> None:
