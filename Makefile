@@ -33,7 +33,7 @@ lint: $(READY)
 	$(BIN)/ruff format --check .
 	$(BIN)/mypy
 	$(BIN)/lint-imports
-	$(BIN)/python -m docs.long_sentences
+	$(BIN)/python -m docs.words
 
 browser:                ## Debian's Chromium, for the tests of the pages; where nobody may install it, they are skipped
 	@command -v chromium >/dev/null || [ "$$(id -u)" != 0 ] || ! command -v apt-get >/dev/null || \
@@ -86,6 +86,7 @@ docs: $(READY)          ## the documents' pictures and figures, made anew
 	$(BIN)/positioner demo --loop flow --out demo-out && cp demo-out/flow_loop.png docs/img/
 	$(BIN)/python -m docs.operator_picture docs/img/operator-page.png
 	$(BIN)/python -m docs.page_pictures docs/img
+	$(BIN)/python -m docs.drawings docs/img
 	$(BIN)/python -m docs.code_tables
 	$(BIN)/python -m sim.effects docs/effects.md
 	$(BIN)/python docs/notebook.py docs/tutorial.md docs/slow-data.md docs/recordings.md docs/valve-file.md

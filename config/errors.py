@@ -2,7 +2,7 @@
 
 from collections.abc import Mapping
 
-LONGEST = 2000
+PROBLEM_CHARACTERS = 2000
 """Characters of a problem; what stands in its middle beyond that is left out."""
 
 
@@ -15,7 +15,11 @@ def one_line(text: str) -> str:
     if not text.isprintable():
         said = " ".join(text.splitlines())
         text = "".join(each if each.isprintable() else each.encode("unicode_escape").decode() for each in said)
-    return text if len(text) <= LONGEST else f"{text[: LONGEST // 2]} .. {text[-LONGEST // 2 :]}"
+    return (
+        text
+        if len(text) <= PROBLEM_CHARACTERS
+        else f"{text[: PROBLEM_CHARACTERS // 2]} .. {text[-PROBLEM_CHARACTERS // 2 :]}"
+    )
 
 
 class InputError(Exception):

@@ -69,11 +69,11 @@ WIDTHS = (64, 32, 16, 8, 5, 4, 3)
 """Samples of a window, the longest first."""
 STRAIGHT = 8
 """Samples from which a window may go along a straight line; it then begins half a window after the one before."""
-FEWEST, FEWEST_WINDOWS = 20.0, 8
+FEWEST_DEGREES_OF_FREEDOM, FEWEST_WINDOWS = 20.0, 8
 """Degrees of freedom that tell a noise, to 16 %; windows: of one alone nothing shows whether it is like others."""
 LEAST_SHARE = 0.01
 """Of the windows: fewer may be still by chance."""
-ALIKE = 1.25
+ALIKE_NOISE_FACTOR = 1.25
 """Ratio of the noises that two widths find, up to which they are one."""
 AS_MANY = 0.5
 """Of the samples that another width finds: as many are enough."""
@@ -91,7 +91,7 @@ FOLLOWS = 0.3
 """Correlation with the drive from which a stem is not at rest."""
 FOLLOWS_OF_FEW = 0.5
 """The same where so few samples are there that noise itself may come to more."""
-LATEST = 3
+LATEST_FOLLOWING_SAMPLES = 3
 """Samples by which the stem follows its drive at most."""
 HELD_WIDTHS = (256, 128, 64, 32, 16)
 HELD_FOR, PARABOLA = 3, 3
@@ -115,7 +115,7 @@ ROUNDING_ALONE, LEAST_LEVEL = 1.5, 0.25
 """Times q/√12 up to which what is found is rounding and hardly anything else; share of the windows that go nowhere."""
 FROZEN_BY_CHANCE, FEWEST_FROZEN = 1e-6, 8
 """Chance, in all samples, of a run of like readings at rest, below which it is none; samples of a run at least."""
-NEAR, LEAST_NOISY = 4.5, 0.02
+NEAR_QUANTA, LEAST_NOISY = 4.5, 0.02
 """Quanta by which a change may be noise's, and no move; share of such changes from which on there is noise."""
 SCATTERED, TO_AND_FRO = 0.7, 0.5
 """Share of unrounded readings that differ from the one before, and of their changes that turn back, of noise."""
@@ -193,7 +193,7 @@ def position_noise_m(position_m: Array, drive_pa: Array | None = None) -> float 
         return None
     # Motion only adds: what another width finds far above the least is motion that looks like noise.
     least_m = min(each.noise_m for each in found)
-    found = [each for each in found if each.noise_m <= ALIKE * least_m]
+    found = [each for each in found if each.noise_m <= ALIKE_NOISE_FACTOR * least_m]
     most = max(each.share for each in found)
     noise_m = next(each.noise_m for each in found if each.share >= AS_MANY * most)
     if noise_m == 0.0 and np.unique(position_m[np.isfinite(position_m)]).size <= FEW_STEPS:
@@ -298,7 +298,7 @@ def _longest_by_chance(changes: Array, quantum: float) -> float:
     if not quantum:
         scatters = moved.size > SCATTERED * changes.size and back.size > TO_AND_FRO * moved.size
         return FEWEST_FROZEN if scatters else np.inf
-    noise = np.count_nonzero((back > 1.5 * quantum) & (back <= NEAR * quantum))
+    noise = np.count_nonzero((back > 1.5 * quantum) & (back <= NEAR_QUANTA * quantum))
     if noise < LEAST_NOISY * changes.size or not noise:
         return np.inf
     likely = _alike(noise / changes.size)
@@ -342,7 +342,7 @@ def _of_width(position_m: Array, drive_pa: Array | None, width: int) -> _Told | 
     s, limit = windows.scatter, windows.limit
     rms = np.sqrt(np.cumsum(s**2) / np.arange(1, s.size + 1))
     each = windows.freedom * windows.share
-    fewest = max(int(FEWEST / each), int(LEAST_SHARE * s.size), FEWEST_WINDOWS - 1) + 1
+    fewest = max(int(FEWEST_DEGREES_OF_FREEDOM / each), int(LEAST_SHARE * s.size), FEWEST_WINDOWS - 1) + 1
     if s.size < fewest:
         return None
     least, most = float(s[fewest - 1]), float(s[-1])
@@ -393,8 +393,8 @@ def _windows(position_m: Array, drive_pa: Array | None, width: int) -> _Windows 
     order = np.argsort(scatter, kind="stable")
     drive = None
     if drive_pa is not None:
-        earlier = np.concatenate([np.full(LATEST, drive_pa[0]), drive_pa])
-        drive = sliding_window_view(earlier, width + LATEST)[::stride][rows][order]
+        earlier = np.concatenate([np.full(LATEST_FOLLOWING_SAMPLES, drive_pa[0]), drive_pa])
+        drive = sliding_window_view(earlier, width + LATEST_FOLLOWING_SAMPLES)[::stride][rows][order]
     return _Windows(left[order], scatter[order], drive, freedom, stride / width)
 
 
@@ -412,8 +412,8 @@ def _follows(windows: _Windows, count: int, freedom: float) -> bool:
         return False
     left, width = windows.left[:count], windows.left.shape[1]
     drive = windows.drive[:count]
-    for late in range(LATEST + 1):
-        u = drive[:, LATEST - late : LATEST - late + width]
+    for late in range(LATEST_FOLLOWING_SAMPLES + 1):
+        u = drive[:, LATEST_FOLLOWING_SAMPLES - late : LATEST_FOLLOWING_SAMPLES - late + width]
         u = u - u.mean(axis=1, keepdims=True)
         power = float(np.sum(u**2) * np.sum(left**2))
         # A controller that answers the noise makes the drive go against the position.

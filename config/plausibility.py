@@ -40,7 +40,7 @@ SELDOM, OFTEN = 0.2, 0.8
 """Parts of the rows in which a set point changes, and a measured position, with its noise."""
 UNLIKE = 0.02
 """Ratio of the spans of position and set point below which, or over whose inverse, their units differ."""
-STEADY = 0.9
+STEADY_RUN_SHARE = 0.9
 """Part of the runs of equal positions that are as long as most, or twice, and so on."""
 STRAIGHT = 0.3
 """Share of the moving rows on straight lines, from which on a historian drew them."""
@@ -253,7 +253,7 @@ def _of_repeats(time_s: Column, position_m: Column, asked: Column | None) -> Ite
             return  # it moves when it is asked to, and is read coarsely
     runs = np.diff(changes)
     often = int(np.median(runs))
-    if often > 1 and float((runs % often == 0).mean()) > STEADY:
+    if often > 1 and float((runs % often == 0).mean()) > STEADY_RUN_SHARE:
         period_s = often * float(np.median(np.diff(time_s)))
         yield (
             f"the position changes every {often} rows alone: it is read every {period_s:.3g} s and written more often; "

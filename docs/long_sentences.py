@@ -1,11 +1,6 @@
-"""Counts the sentences of the documents that are longer than 30 words: `python -m docs.long_sentences`.
-
-The count may only fall. `MOST` is what there is; who shortens a sentence lowers it. Without an argument it prints the
-count; with `--list` it prints each sentence with its page.
-"""
+"""The sentences of the documents that are longer than 30 words; `python -m docs.words` counts them."""
 
 import re
-import sys
 from collections.abc import Iterator
 from pathlib import Path
 
@@ -13,8 +8,6 @@ ROOT = Path(__file__).parents[1]
 PAGES = [ROOT / "README.md", ROOT / "CONTRIBUTING.md", *sorted((ROOT / "docs").rglob("*.md"))]
 LONGEST_WORDS = 30
 """Words of a sentence that is read once; 25 are the aim."""
-MOST = 50
-"""Longer sentences that there are."""
 FENCED = re.compile(r"^```.*?^```", re.MULTILINE | re.DOTALL)
 NO_TEXT = re.compile(r"<!--.*?-->|!\[[^\]]*\]\([^)]*\)", re.DOTALL)
 NO_LINE = re.compile(r" {4}|>>> |\.\.\. |[|\- ]+$")
@@ -40,22 +33,3 @@ def long_sentences() -> Iterator[tuple[str, str]]:
         for sentence in sentences(page.read_text(encoding="utf-8")):
             if len(re.findall(r"\w[\w'-]*", sentence)) > LONGEST_WORDS:
                 yield str(page.relative_to(ROOT)), sentence
-
-
-def main() -> int:
-    """Print the count, or the sentences; exit status 1 where there are more than `MOST`."""
-    found = list(long_sentences())
-    if "--list" in sys.argv[1:]:
-        for page, sentence in found:
-            print(f"{page}: {sentence}")
-    said = f"{len(found)} sentences of more than {LONGEST_WORDS} words"
-    if len(found) > MOST:
-        print(f"{said}, {MOST} were there: shorten what is new (python -m docs.long_sentences --list)")
-        return 1
-    if len(found) < MOST:
-        print(f"{said}: set MOST in docs/long_sentences.py to {len(found)}, so that it stays")
-    return 0
-
-
-if __name__ == "__main__":
-    sys.exit(main())

@@ -15,7 +15,7 @@ else both are one: a stem that slides slowly, seen through noise, is no stem tha
 same direction, by less than `TAIL` noises and more slowly than the whole, is the end of the move before: a stem that
 breaks loose is fast.
 
-x position, m; sigma standard deviation of its noise, m; c = `SEEN`.
+x position, m; sigma standard deviation of its noise, m; c = `SEEN_DEVIATIONS`.
 """
 
 from collections.abc import Callable
@@ -30,13 +30,13 @@ Mask = npt.NDArray[np.bool_]
 Run = tuple[int, int]
 """Samples at rest last before a motion and first after it."""
 
-SEEN = 5.0
+SEEN_DEVIATIONS = 5.0
 """Standard deviations of D_w beyond which it is no noise: of 12 000 samples in 7 widths one in 20 records has one."""
 WIDTHS = (1, 2, 4, 8, 16, 32, 64)
 """Samples of a window: a stem that creeps by a noise in 60 samples is still seen to move."""
 AT_REST = 2.5
 """Standard deviations of the noise within which a sample lies at a rest."""
-FEWEST = 3
+FEWEST_REST_SAMPLES = 3
 """Samples of a rest between two moves: of fewer no slope tells that the stem stood still."""
 COVERED = 6.0
 """Standard deviations of the noise that a move covers: what creeps by less is a rest, of a sensor that settles."""
@@ -72,7 +72,7 @@ def moving(position_m: Array, noise_m: float) -> Mask:
         seen_before = np.concatenate([[0], np.cumsum(moves)])
         # The window of `across[j]` holds the steps j .. j + 2 w - 2; its middle one is j + w - 1.
         clear = seen_before[2 * w - 1 :] == seen_before[: n - 2 * w + 1]
-        found = clear & (across > SEEN * noise_m * np.sqrt(2.0 / w))
+        found = clear & (across > SEEN_DEVIATIONS * noise_m * np.sqrt(2.0 / w))
         middle = np.flatnonzero(found) + w - 1
         for reach in range(-(w // 2), w // 2 + 1):
             moves[middle + reach] = True
@@ -118,7 +118,7 @@ def _rests_between(x: Array, noise_m: float, one: Run, other: Run) -> bool:
     """Return whether the samples between two moves show a rest."""
     first, last = one[1], other[0]
     count = last - first + 1
-    if count < FEWEST:
+    if count < FEWEST_REST_SAMPLES:
         return False
     rows = np.arange(count) - 0.5 * (count - 1)
     square = float(rows @ rows)

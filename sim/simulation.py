@@ -12,7 +12,7 @@ from config.valve_file import ValveFile
 from sim.transmitter import Transmitter
 from sim.valve import Valve
 
-FEWEST = 2
+FEWEST_ROWS = 2
 
 
 @kinds_held
@@ -43,7 +43,7 @@ def simulate(
         InputError: series of other shapes or values, or an effect that is unknown or not physical.
     """
     time, command = _series("time_s", time_s), _series("command_pa", command_pa)
-    if time.size != command.size or time.size < FEWEST:
+    if time.size != command.size or time.size < FEWEST_ROWS:
         raise InputError(
             "simulate",
             f"time_s holds {time.size} values, command_pa {command.size}; allowed are equally many, 2 or more",

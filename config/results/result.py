@@ -22,7 +22,7 @@ if TYPE_CHECKING:
 
 LONGEST_REPR = 240
 LONGEST_VALUE = 40
-FEW = 3
+FEW_ITEMS = 3
 """Items of a series that are shown one by one."""
 
 
@@ -92,7 +92,7 @@ def _shown(value: object) -> str:
         return f"{value:.6g}"
     if isinstance(value, Mapping):
         return f"{{{_cut(', '.join(map(str, value)), LONGEST_VALUE)}}}"
-    if isinstance(value, tuple | list) and (len(value) > FEW or any(hasattr(each, "__len__") for each in value)):
+    if isinstance(value, tuple | list) and (len(value) > FEW_ITEMS or any(hasattr(each, "__len__") for each in value)):
         return f"({len(value)} items)"
     return _cut(repr(value), LONGEST_VALUE)
 

@@ -20,7 +20,7 @@ from socketserver import BaseRequestHandler
 from typing import Protocol
 
 HEADER = struct.Struct(">HHHB")
-SHORTEST, LONGEST = 2, 254
+SHORTEST, LONGEST_FRAME_BYTES = 2, 254
 """What the length of a frame can be."""
 CHUNK = 4096
 SEND_TIMEOUT_S = 1.0
@@ -67,7 +67,7 @@ class Connection(BaseRequestHandler):
                     return
                 stream += more
             transaction, protocol, length, unit = HEADER.unpack_from(stream)
-            if not SHORTEST <= length <= LONGEST:
+            if not SHORTEST <= length <= LONGEST_FRAME_BYTES:
                 return
             end = HEADER.size - 1 + length
             while len(stream) < end:

@@ -11,7 +11,7 @@ from config.errors import InputError
 from positioner.history import HistoryReader
 from positioner.history.entries import Event
 
-MOST = 100
+MOST_EVENTS = 100
 """At a look; of more the newest."""
 
 
@@ -49,7 +49,9 @@ class ToldEvents:
         try:
             with HistoryReader(self._history) as history:
                 return [
-                    each for each in history.events(self._valve, limit=MOST) if last < each.number <= (self._last or 0)
+                    each
+                    for each in history.events(self._valve, limit=MOST_EVENTS)
+                    if last < each.number <= (self._last or 0)
                 ]
         except InputError:
             return []

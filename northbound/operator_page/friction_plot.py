@@ -10,7 +10,7 @@ from northbound.operator_page.marks import DASHES
 from webpage.theme import Theme
 from webpage.units import Units
 
-FEWEST = 2
+FEWEST_LINE_ROWS = 2
 """Rows that a line needs."""
 
 
@@ -30,7 +30,7 @@ class FrictionPlot:
         """Draw it anew where there is something new, or other units or colours."""
         rows = self._view.friction
         shown = (len(rows), rows[-1:], self._units.pressure.name, self._theme.is_dark)
-        if len(rows) < FEWEST or shown == self._shown:
+        if len(rows) < FEWEST_LINE_ROWS or shown == self._shown:
             return
         self._shown = shown
         self._chart.options.clear()

@@ -23,7 +23,7 @@ STATIC = 0.5
 """Of Coulomb friction: static friction is taken for no more beyond it, where no shorter slide has been seen."""
 UNSEEN = 3.0
 """Times the friction of the direction that was seen: the most that is expected in the other."""
-NEAR, RESIDUALS = 0.02, 3.0
+NEAR_STROKE_SHARE, RESIDUALS = 0.02, 3.0
 """Of the stroke; of the deviation of landings: by which the balance may be off at a place."""
 
 
@@ -79,5 +79,5 @@ def rest_band(
     slope_pa_per_m, landings = -ratios.b_over_c, statics.landings
     shortest_m = min((abs(each.position_m - each.from_m) for each in landings), default=stroke_m)
     residual_m = statics.law.residual_m if isfinite(statics.law.residual_m) else 0.0
-    off_m = max(NEAR * stroke_m, RESIDUALS * residual_m)
+    off_m = max(NEAR_STROKE_SHARE * stroke_m, RESIDUALS * residual_m)
     return RestBand(ratios, landings, statics.valve, slope_pa_per_m * shortest_m, slope_pa_per_m * off_m)

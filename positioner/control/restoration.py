@@ -26,7 +26,7 @@ from positioner.estimation.landings.extended_balance import extended_landing_pa
 from positioner.estimation.landings.landing_detector import STOP, VISIBLE, SlideOutcome
 from positioner.estimation.landings.local_balance import landing_pa
 
-DEVIATIONS, LEAST = 3.0, 3e-3
+DEVIATIONS, AGREEING_STROKE_SHARE = 3.0, 3e-3
 """Of the stroke: landings nearer than this agree."""
 SAT_STILL = 0.01
 """Of friction: a standard deviation of what a packing that was left alone holds more or less."""
@@ -139,4 +139,4 @@ def _within_m(
 ) -> float:
     still_m = SAT_STILL * knowledge.friction_m
     std_m = hypot(knowledge.deviation_m(should_m, direction), still_m, outcome.std_m)
-    return max(DEVIATIONS * std_m, LEAST * stroke_m)
+    return max(DEVIATIONS * std_m, AGREEING_STROKE_SHARE * stroke_m)

@@ -16,7 +16,7 @@ from fieldbus.modbus.admission import Allowance
 AT_ONCE = 4
 """Failures before the first wait: a reply that was lost, and three attempts."""
 FIRST_S = 0.01
-SHARE = 0.1
+RETRY_TIME_SHARE = 0.1
 """Of the time of a line that is shared, which attempts may take at the most."""
 MOST_DOUBLINGS = 30
 """Failures beyond are not counted: every wait is the longest by then."""
@@ -48,7 +48,7 @@ class Backoff:
         self._failures = min(self._failures + 1.0, self._at_once + MOST_DOUBLINGS)
         beyond = math.ceil(self._failures - self._at_once)
         if beyond > 0:
-            first_s = max(FIRST_S, (1.0 / SHARE - 1.0) * took_s) if self._shared else FIRST_S
+            first_s = max(FIRST_S, (1.0 / RETRY_TIME_SHARE - 1.0) * took_s) if self._shared else FIRST_S
             self._next_s = now_s + min(first_s * 2.0 ** (beyond - 1), self._longest_s)
 
     def succeeded(self) -> None:

@@ -63,11 +63,11 @@ _STEP = _step_matrix()
 _WEIGHTS = np.array([n + feeds[0][1] for feeds in CHAINS for n in range(1, LEVELS + 1)], dtype=float)
 _READ = np.array([[LEVELS * chain + n - 1 for n in ROWS] for chain in range(len(CHAINS))])
 
-GAP = 4.0
+GAP_MEAN_STEPS = 4.0
 """A step longer than this many mean steps has missed commands."""
 FIRST, AGAIN = 1 / 32, 2.0
 """The columns are kept at this share of the window, and whenever time has grown by this factor since."""
-FEWEST = 6
+FEWEST_SAMPLES = 6
 """Samples before which no columns are kept."""
 
 
@@ -128,7 +128,7 @@ class Identifier:
         k2, k3 = k * k, k * k * k
         x0, dx = self._x, x - self._x
         # Over a gap the commands in between are not known: a line through them is nearer than the last of them.
-        gap = h * self._t > GAP * self._squared_steps > 0
+        gap = h * self._t > GAP_MEAN_STEPS * self._squared_steps > 0
         self._gaps += gap
         u0, du = (u, 0.0) if self._pressure_held and not gap else (self._u, u - self._u)
         z[STATES:] = (
@@ -140,7 +140,7 @@ class Identifier:
         self._t, self._x, self._u = t, x, u
         self._squared_steps += h * h
         self._count += 1
-        if self._count >= FEWEST and t >= (AGAIN * self._kept[-1].end if self._kept else FIRST):
+        if self._count >= FEWEST_SAMPLES and t >= (AGAIN * self._kept[-1].end if self._kept else FIRST):
             self._kept.append(self._window())
 
     def _bend(self, slope: float, h: float) -> None:

@@ -39,7 +39,7 @@ CERTAIN = 4.0
 """Times what residuals may be, beyond which one is no chance."""
 IN_A_ROW = 2
 """Samples: one alone is a spike, which no fit of hundreds hangs on."""
-FIRST = 10
+FIRST_MOVING_SAMPLES = 10
 """Samples that tell how fast a stem is after it has left its rest."""
 LATE = 1.5
 """Times the median interval: a longer one has hidden a command."""
@@ -92,9 +92,11 @@ def _leaves_no_rest(
         std: of the two.
     """
     s, rest_m = stretch.direction, float(stretch.position_m[: stretch.begins].mean())
-    steps, first = np.diff(motion.time_s)[1 : FIRST + 1], motion.position_m[: FIRST + 1]
+    steps, first = np.diff(motion.time_s)[1 : FIRST_MOVING_SAMPLES + 1], motion.position_m[: FIRST_MOVING_SAMPLES + 1]
     speed = abs(float(np.median(np.diff(first) / steps))) if len(steps) else 0.0
-    late_m = speed * float(steps.max(initial=0.0)) + g * float(_hidden_changes_pa(motion)[: FIRST + 1].sum())
+    late_m = speed * float(steps.max(initial=0.0)) + g * float(
+        _hidden_changes_pa(motion)[: FIRST_MOVING_SAMPLES + 1].sum()
+    )
     back_m, back_m_per_s = -s * (x_0 - rest_m), -s * v_0
     return back_m > CERTAIN * float(std[0]) + late_m or back_m_per_s > CERTAIN * float(std[1]) + speed
 

@@ -23,7 +23,7 @@ import numpy.typing as npt
 from positioner.estimation.array import Array
 from positioner.estimation.motion_segment import MotionSegment
 
-FEWEST = 6
+FEWEST_SAMPLES = 6
 """Samples in a slope's window, and in a motion."""
 STANDS_OUT = 4.0
 """Standard deviations beyond which a slope or a position is no chance."""
@@ -76,7 +76,7 @@ def find_motions(
         noise_std_m: of the positions.
         threshold_m_per_s: velocity below which the stem counts as stopped.
     """
-    if len(time_s) < 2 * FEWEST:
+    if len(time_s) < 2 * FEWEST_SAMPLES:
         return Segmentation((), (), 0, 0.0)
     period_s = float(np.median(np.diff(time_s)))
     window = _window(period_s, noise_std_m, threshold_m_per_s, len(time_s))
@@ -136,7 +136,7 @@ def whole_stretch(
 
 def _window(period_s: float, noise_std_m: float, threshold_m_per_s: float, count: int) -> int:
     length_s = (sqrt(12 * period_s) * noise_std_m / threshold_m_per_s) ** (2 / 3)
-    return int(min(max(FEWEST, round(length_s / period_s)), count // 2))
+    return int(min(max(FEWEST_SAMPLES, round(length_s / period_s)), count // 2))
 
 
 def slopes(time_s: Array, position_m: Array, window: int) -> Array:
@@ -197,12 +197,12 @@ def _trimmed(
     before, begin, end, after = rows
     travel = direction * position_m
     band = STANDS_OUT * noise_std_m + 1e-9
-    rests_from = max(before, begin - max(REST_WINDOWS * max(window, 2 * FEWEST), (end - begin) // REST_SHARE))
+    rests_from = max(before, begin - max(REST_WINDOWS * max(window, 2 * FEWEST_SAMPLES), (end - begin) // REST_SHARE))
     from_rest, starts = _leaves_rest(travel, rests_from, begin, end, band, window)
     if not from_rest and before == 0 and _jumps_at_once(pressure_pa):
         from_rest, rests_from, starts = True, 0, 1
     stop = _reaches_rest(travel, begin, end, after, band, window)
-    if stop - starts < 2 * FEWEST:
+    if stop - starts < 2 * FEWEST_SAMPLES:
         return None, (starts, max(stop, starts))
     first = rests_from if from_rest else starts
     return (
@@ -221,14 +221,14 @@ def _trimmed(
 def _leaves_rest(travel: Array, rests_from: int, begin: int, end: int, band: float, window: int) -> tuple[bool, int]:
     """Return whether the motion begins from rest, and the last row that does not yet stand out of it."""
     around = travel[rests_from : min(end, begin + 2 * window)]
-    known = max(FEWEST, min(begin - rests_from - window // 2, len(around)), len(around) // 8)
+    known = max(FEWEST_SAMPLES, min(begin - rests_from - window // 2, len(around)), len(around) // 8)
     quiet = around[:known]
     level = float(np.median(quiet))
-    if len(quiet) < FEWEST or float(np.abs(quiet - level).max()) > 2 * band:
+    if len(quiet) < FEWEST_SAMPLES or float(np.abs(quiet - level).max()) > 2 * band:
         return False, begin
     out = around > level + band
     twice = np.flatnonzero(out[:-1] & out[1:])  # one sample alone is chance
-    if not len(twice) or twice[0] < FEWEST:
+    if not len(twice) or twice[0] < FEWEST_SAMPLES:
         return False, begin
     return True, rests_from + int(twice[0]) - 1
 
@@ -236,7 +236,7 @@ def _leaves_rest(travel: Array, rests_from: int, begin: int, end: int, band: flo
 def _jumps_at_once(pressure_pa: Array) -> bool:
     """Whether the record begins with the jump of the pressure that moved the stem: then it rested until then."""
     jumps = np.abs(np.diff(pressure_pa[:200]))
-    return bool(len(jumps) > FEWEST and jumps[0] > JUMP * jumps[1:].max())
+    return bool(len(jumps) > FEWEST_SAMPLES and jumps[0] > JUMP * jumps[1:].max())
 
 
 def _reaches_rest(travel: Array, begin: int, end: int, after: int, band: float, window: int) -> int:
@@ -268,5 +268,5 @@ def _unbroken(segment: MotionSegment, period_s: float) -> list[MotionSegment]:
             earliest=max(0, segment.earliest - first),
         )
         for first, last in pairwise(edges)
-        if last - max(first, segment.begins) >= 2 * FEWEST
+        if last - max(first, segment.begins) >= 2 * FEWEST_SAMPLES
     ]

@@ -9,7 +9,7 @@ import pytest
 
 from config import plain_file
 from config.daemon_file import load_valves
-from config.errors import LONGEST, InputError
+from config.errors import PROBLEM_CHARACTERS, InputError
 from config.plain_file import MOST_BYTES, MOST_COLUMNS, MOST_VALUES
 from config.recording import Recording
 from config.role_passwords import read_passwords
@@ -184,7 +184,7 @@ def test_what_a_library_says_in_lines_or_at_length_is_one_line_of_bounded_length
             read(path)
         assert str(caught.value).startswith(f"{path}: ")
         assert str(caught.value).isprintable()
-        assert len(str(caught.value)) < LONGEST + len(str(path)) + 10
+        assert len(str(caught.value)) < PROBLEM_CHARACTERS + len(str(path)) + 10
 
 
 def test_a_file_of_passwords_nested_without_end_is_one_line(tmp_path: Path) -> None:

@@ -21,7 +21,7 @@ from sim.effect import first_effects, shipped_effect, shipped_effects, tried_eff
 from tests.workbench.valves import error_of
 from workbench.blind import trial
 from workbench.blind.hiding import Hidden, drawn_effects, drawn_valve, hide, known_valve, strength
-from workbench.blind.input_signal import FIRST, excitation
+from workbench.blind.input_signal import FIRST_PASSAGE_SHARE, excitation
 from workbench.blind.sealing import FILES, SEALED, seal
 from workbench.blind.trial import NOISE_M
 from workbench.data.motion import slips
@@ -223,7 +223,7 @@ def test_the_floor_is_the_noise_when_clean_and_repeats(bare: Hidden) -> None:
     for name, recording in (("fit", bare.fit), ("test", bare.test)):
         assert bare.answer["floor_m"][name] == pytest.approx(NOISE_M, rel=0.05)
         lag = repeat_lag(recording.command_pa)
-        assert lag == len(recording) - round(FIRST * len(recording))
+        assert lag == len(recording) - round(FIRST_PASSAGE_SHARE * len(recording))
         repeatability = repeatability_m(recording.command_pa, recording.position_m)
         assert repeatability == pytest.approx(NOISE_M, rel=0.15)
 
@@ -342,7 +342,7 @@ def test_every_command_stays_in_reach_and_repeats() -> None:
         assert command_pa.size == 3001
         assert command_pa.min() >= 0.0
         assert command_pa.max() <= most
-        assert repeat_lag(command_pa) == 3001 - round(FIRST * 3001)
+        assert repeat_lag(command_pa) == 3001 - round(FIRST_PASSAGE_SHARE * 3001)
 
 
 def test_the_truth_simulates_to_the_record(hidden: Hidden) -> None:

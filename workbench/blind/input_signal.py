@@ -24,7 +24,7 @@ import numpy as np
 from config.recording import Column
 from config.valve_file import ValveParameters
 
-FIRST = 0.26
+FIRST_PASSAGE_SHARE = 0.26
 """Part of the record that is the first passage, and again the last."""
 MOVES_OF_FIRST = 4
 AT_REST = 0.04
@@ -67,7 +67,7 @@ def excitation(valve: ValveParameters, generator: np.random.Generator, count: in
     excess_pa = (valve.static_n - valve.coulomb_n) / valve.diaphragm_area_m2
     home_pa = closing_pa(valve, CLOSED[0] * valve.stroke_m)
     levels = [home_pa, *(_level_pa(valve, generator, opens=i % 2 == 0) for i in range(len(moves) - 1)), home_pa]
-    early = round(FIRST * count)
+    early = round(FIRST_PASSAGE_SHARE * count)
     rest = round(AT_REST * early)
     counts = [
         *_shared(generator, early - rest, MOVES_OF_FIRST),
@@ -81,7 +81,7 @@ def excitation(valve: ValveParameters, generator: np.random.Generator, count: in
 
 def lead_in(command_pa: Column, count: int) -> Column:
     """Return the commands, Pa, at most `count`, that precede the last passage: after them the first begins alike."""
-    repeated = command_pa.size - round(FIRST * command_pa.size)
+    repeated = command_pa.size - round(FIRST_PASSAGE_SHARE * command_pa.size)
     return command_pa[max(0, repeated - count) : repeated]
 
 

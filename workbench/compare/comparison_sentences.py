@@ -22,10 +22,10 @@ from workbench.data.noise_floor import UNKNOWN
 CERTAIN = 3.5
 MOVES = 20.0
 """What counts as motion, so many times: a stem that goes so far one way has moved, without a slip too; noise goes 9."""
-FEWEST = 3
+FEWEST_SLIPS = 3
 MOST_LISTED = 8
 """Notes listed one by one."""
-SHARE = 0.5
+NAMED_PHASE_SHARE = 0.5
 """Part of the squared error from which a phase is named."""
 MOST_STRETCHES = 20
 """Of a sentence, the gravest."""
@@ -183,13 +183,13 @@ def _by_direction(
     means = {}
     for direction in (1, -1):
         part = np.array([value for pair, value in zip(pairs, values, strict=True) if pair.direction == direction])
-        if part.size >= FEWEST:
+        if part.size >= FEWEST_SLIPS:
             mean, error = float(np.median(part)), float(np.std(part, ddof=1)) / part.size**0.5
             if _certain(mean, error, matters):
                 means[direction] = mean
     if not means:
         pooled = np.array(values)
-        if pooled.size >= FEWEST and len({each.direction for each in pairs}) == 2:
+        if pooled.size >= FEWEST_SLIPS and len({each.direction for each in pairs}) == 2:
             mean, error = float(np.median(pooled)), float(np.std(pooled, ddof=1)) / pooled.size**0.5
             if _certain(mean, error, matters):
                 text = f"{when}, {unit(abs(mean))} {words[0] if mean > 0 else words[1]}, both directions"
@@ -254,7 +254,7 @@ def _share(found: Findings) -> Iterator[Sentence]:
     squares = np.bincount(found.phase, found.residual_m**2, len(PHASES))
     worst = int(squares.argmax())
     share = float(squares[worst] / squares.sum()) if squares.sum() else 0.0
-    if share > SHARE:
+    if share > NAMED_PHASE_SHARE:
         inside = found.phase == worst
         part = found.residual_m[inside]
         where = "near the stops" if PHASES[worst] == "near stops" else f"in phase {PHASES[worst]!r}"
@@ -312,7 +312,7 @@ def _block_mean(found: Findings, rows: NDArray[np.bool_]) -> tuple[float, float]
     blocks = _blocks(found.time_s[rows])
     means = np.bincount(blocks, found.residual_m[rows]) / np.bincount(blocks)
     independent = min(means.size, len(found.measured_slips))
-    if independent < FEWEST:
+    if independent < FEWEST_SLIPS:
         return float(means.mean()), np.inf
     return float(means.mean()), float(np.std(means, ddof=1)) / independent**0.5
 

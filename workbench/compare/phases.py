@@ -16,7 +16,7 @@ from workbench.data.motion import Slip, directions
 
 PHASES = ("stuck", "slipping up", "slipping down", "reversal", "near stops")
 STUCK, UP, DOWN, REVERSAL, NEAR_STOPS = range(len(PHASES))
-NEAR = 0.02
+NEAR_STOP_STROKE_SHARE = 0.02
 """Of the stroke: nearer to a stop the stem is near it."""
 
 
@@ -28,7 +28,7 @@ def phases(position_m: Column, noise_m: float, found: Sequence[Slip], valve: Val
         if i and slip.direction != found[i - 1].direction:
             phase[slip.first : found[i + 1].first if i + 1 < len(found) else None] = REVERSAL
     for lower_m, upper_m in _stops(valve):
-        margin_m = NEAR * valve.valve.stroke_m
+        margin_m = NEAR_STOP_STROKE_SHARE * valve.valve.stroke_m
         phase[(position_m < lower_m + margin_m) | (position_m > upper_m - margin_m)] = NEAR_STOPS
     return phase
 

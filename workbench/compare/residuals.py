@@ -23,7 +23,7 @@ BAND_99 = 2.576
 MEMORY = 0.2
 """Part of the record over which correlations are summed for the input's band."""
 BINS = 20
-FEWEST = 5
+FEWEST_BIN_ROWS = 5
 LONGEST_WINDOW = 1024
 """Samples of a piece of which a spectrum is made."""
 
@@ -76,7 +76,7 @@ def profile(over: Column, values: Column, bins: int = BINS) -> Profile:
         else np.zeros(over.size, np.int64)
     )
     count = np.bincount(member, minlength=bins)
-    kept = np.flatnonzero(count >= FEWEST)
+    kept = np.flatnonzero(count >= FEWEST_BIN_ROWS)
     n = count[kept]
     mean = np.bincount(member, values, bins)[kept] / n
     square = np.bincount(member, values**2, bins)[kept] / n

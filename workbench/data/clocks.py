@@ -21,7 +21,7 @@ MOVED = 6.0
 """Noises by which a stem moves from one sample to the next."""
 HELD = 3
 """Samples for which a command is held before it turns: those of a loop that is faster than they are show any order."""
-FEWEST = 6
+FEWEST_TURNS = 6
 """Turns that tell."""
 NEARLY_ALL = 0.9
 """Share of the turns that the stem makes first, and of these of those that are early by the same time."""
@@ -66,7 +66,7 @@ def early(
     found = [_turns(command[first:end], position_m[first:end], scale_m) for first, end in segments]
     turns = sum(count for count, _ in found)
     samples = np.concatenate([each for _, each in found])
-    if turns < FEWEST or samples.size < NEARLY_ALL * turns:
+    if turns < FEWEST_TURNS or samples.size < NEARLY_ALL * turns:
         return None
     middle = float(np.median(samples))
     if np.mean(np.abs(samples - middle) <= THE_SAME) < NEARLY_ALL:

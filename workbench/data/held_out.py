@@ -23,7 +23,7 @@ from workbench.data.stretches import informative
 
 HELD_OUT = 1.0 / 3.0
 """Part of the recording that is held out where no other is given."""
-FEWEST = 40
+SIDE_SAMPLES = 40
 """Samples on either side."""
 KNOWN = 0.5
 """Share of the held-out samples that may stand in what is fitted, too: two recordings may begin alike."""
@@ -112,8 +112,8 @@ def split(recordings: Sequence[Recording], test: Recording | None = None) -> Spl
     with _of_held_out():
         held_out = _part(test, 0) if test else _part(whole, end)
     for part, what in ((train, "to fit"), (held_out, "held out")):
-        if part.counted.sum() < FEWEST:
-            raise InputError("recording", f"{part.counted.sum()} samples {what} are too few: {FEWEST} are needed")
+        if part.counted.sum() < SIDE_SAMPLES:
+            raise InputError("recording", f"{part.counted.sum()} samples {what} are too few: {SIDE_SAMPLES} are needed")
     _require_unseen(train, held_out)
     floors_m = [each.record.floor_m for each in (train, held_out) if each.record.floor_m is not None]
     return Split(train, held_out, max(floors_m, default=None))

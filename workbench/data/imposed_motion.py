@@ -39,7 +39,7 @@ SMOOTHED = (59.0 / 231.0) ** 0.5
 LEAST_MOTION = 10.0
 """Standard deviations of the noise that a stem moves at least; without noise, 1e-6 of the stroke."""
 NEAR_ENDS = 0.05
-FEWEST = 12
+BALANCE_ROWS = 12
 """Rows that a balance needs."""
 
 
@@ -143,8 +143,8 @@ def rows_of(recordings: list[Recording], valve: ValveParameters) -> Rows:
     if len({part.load_n is None for part in parts}) > 1:
         raise InputError("recording", "bench recordings and static curves cannot be balanced together")
     rows = parts[0] if len(parts) == 1 else _joined(parts)
-    if len(rows) < FEWEST:
-        raise InputError("recording", f"{len(rows)} rows with a known direction, at least {FEWEST} are needed")
+    if len(rows) < BALANCE_ROWS:
+        raise InputError("recording", f"{len(rows)} rows with a known direction, at least {BALANCE_ROWS} are needed")
     if np.unique(rows.direction).size < 2:
         way = "opens" if rows.direction[0] > 0 else "closes"
         problem = f"the stem only {way}: friction and spring cannot be told apart without both ways"
@@ -208,8 +208,8 @@ def _moved(recording: Recording, valve: ValveParameters) -> Rows:
     finite = np.all([np.isfinite(recording.columns[name]) for name in FORCES], axis=0)
     time_s, pressure_pa, position_m, load_n = (recording.columns[name][finite] for name in FORCES)
     notes = [] if finite.all() else [f"{int((~finite).sum())} samples hold what is not a number: left out"]
-    if time_s.size < max(FEWEST, PARABOLA):
-        raise InputError("recording", f"{time_s.size} samples, at least {max(FEWEST, PARABOLA)} are needed")
+    if time_s.size < max(BALANCE_ROWS, PARABOLA):
+        raise InputError("recording", f"{time_s.size} samples, at least {max(BALANCE_ROWS, PARABOLA)} are needed")
     if not np.all(np.diff(time_s) > 0.0):
         raise InputError("recording", "time_s must increase strictly")
     # A rig that never rests shows no noise: then what it sweeps says what motion is.

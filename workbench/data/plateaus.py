@@ -14,7 +14,7 @@ from config.recording import Column
 
 APART = 5.0
 """Standard deviations by which samples at rest differ at most."""
-FEWEST = 3
+FEWEST_PLATEAU_SAMPLES = 3
 CREEPS, DEVIATIONS = 1.0, 3.0
 """Noises, and deviations of the difference, by which the halves of a plateau may differ."""
 
@@ -42,7 +42,7 @@ def plateaus(position_m: Column, noise_m: float, offset: int = 0) -> tuple[Plate
     begins = ended = 0
     for still_from, last in zip(edges[::2].tolist(), edges[1::2].tolist(), strict=True):
         end = last + 1
-        if end - still_from < FEWEST or _creeps(x[still_from:end], noise_m):
+        if end - still_from < FEWEST_PLATEAU_SAMPLES or _creeps(x[still_from:end], noise_m):
             continue
         first = _reached(x, ended, still_from, end, within_m)
         if found and _cut_by_noise(x[begins:ended], x[ended:first], x[first:end], noise_m):

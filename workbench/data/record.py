@@ -27,7 +27,7 @@ from workbench.data.motion import AT_ONCE, rests_first, slips
 from workbench.data.noise_floor import UNKNOWN, noise_std_m, not_repeating_m, repeatability_m, said_noise_m
 from workbench.data.pressure_lag import without_gaps_pa
 
-GAP = 10.0
+GAP_PERIOD_QUANTILES = 10.0
 """A gap is longer than this many times the 95 % quantile of the periods: unevenly logged data have none by that."""
 UNEVEN = 0.05
 """Sampling is uneven if its periods spread by more than this part of their median."""
@@ -452,7 +452,7 @@ def _rises(counted: Column | None) -> dict[int, float]:
 def _longest_step_s(steps: Column) -> float:
     """Return the longest step of time that is no gap."""
     forward = steps[steps > 0.0]
-    return GAP * float(np.quantile(forward, 0.95)) if forward.size else np.inf
+    return GAP_PERIOD_QUANTILES * float(np.quantile(forward, 0.95)) if forward.size else np.inf
 
 
 def _tell_sampling(time_s: Column, segments: tuple[tuple[int, int], ...], notes: list[str]) -> None:

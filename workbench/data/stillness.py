@@ -10,7 +10,7 @@ import numpy as np
 from config.recording import Column
 from workbench.data.record import Mask, Record
 
-FIRST, LONGER = 10, 1.2
+FIRST_ROWS_KEPT, LONGER = 10, 1.2
 """Rows kept after each event, and the ratio of the ages of those kept later."""
 STANDS_STILL = 5.0
 """Noises by which samples at rest differ at most."""
@@ -36,8 +36,8 @@ def eventful(record: Record, drive_pa: Column, first: int, end: int) -> Mask:
         happens[1:] |= np.diff(record.load_n[first:end]) != 0.0
     rows = np.arange(count)
     age = rows - np.maximum.accumulate(np.where(happens, rows, 0))
-    later = np.unique((FIRST * LONGER ** np.arange(MOST_LATER)).astype(np.int64))
-    keep = (age < FIRST) | np.isin(age, later[later < count])
+    later = np.unique((FIRST_ROWS_KEPT * LONGER ** np.arange(MOST_LATER)).astype(np.int64))
+    keep = (age < FIRST_ROWS_KEPT) | np.isin(age, later[later < count])
     keep[:-1] |= happens[1:]
     keep[-1] = True
     return np.asarray(keep)

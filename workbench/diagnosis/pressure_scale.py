@@ -23,7 +23,7 @@ LAGS = np.geomspace(1e-2, 1e3, 41)
 """Over the period of the samples."""
 ROUNDS, LEAST_PA = 10, 1e-3
 """Of weighted least squares, which come to the least mean |e|; and what counts as none there."""
-ALIKE = 0.03
+ALIKE_RATIO = 0.03
 """Relative, of what is taken for the ratio of two units, or for an atmosphere."""
 ATMOSPHERE_PA = 101325.0
 
@@ -43,7 +43,7 @@ class PressureScale(Brief):
         way = f"{self.span:.3g} times as large as" if off_span else "off"
         read = next((f", as {one} read as {other} are" for one, other in _units(self.span)), "") if off_span else ""
         by = "" if off_span else f" by {kind.command.read.said(self.above_pa)}"
-        zero = "" if off_span or abs(self.above_pa / ATMOSPHERE_PA - 1.0) > ALIKE else ", as absolute ones are"
+        zero = "" if off_span or abs(self.above_pa / ATMOSPHERE_PA - 1.0) > ALIKE_RATIO else ", as absolute ones are"
         return kind.text(
             f"the measured {kind.command.word} is {way} the command{by}{read or zero}: what is fitted by it are other "
             "forces; mend its unit, zero or line, or diagnose by the command"
@@ -90,4 +90,4 @@ def _is_another_span(span: float) -> bool:
 def _units(span: float) -> list[tuple[str, str]]:
     """Return which units read as which others would make a pressure so many times as large."""
     pairs = permutations(UNITS_PA, 2)
-    return [(one, other) for one, other in pairs if abs(span * UNITS_PA[one] / UNITS_PA[other] - 1.0) < ALIKE]
+    return [(one, other) for one, other in pairs if abs(span * UNITS_PA[one] / UNITS_PA[other] - 1.0) < ALIKE_RATIO]

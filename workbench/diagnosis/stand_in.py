@@ -22,7 +22,7 @@ from config.valve_file import ValveFile
 from sim.effect import Effect
 from workbench.data.held_out import Split
 from workbench.diagnosis.kept_mass import leaves_something
-from workbench.discover.form_search import FIRST, searched_forms
+from workbench.discover.form_search import FIRST_TURN_FORMS, searched_forms
 from workbench.select.block_errors import AT_FLOOR, NOISE_KNOWN_TO
 from workbench.select.effect_candidates import EffectStep, EvaluatedModel, outdoes
 from workbench.select.effect_search import Progress
@@ -88,7 +88,7 @@ def stand_in(
         parts,
         valve,
         steps[0].before,
-        most=FIRST,
+        most=FIRST_TURN_FORMS,
         workers=workers,
         progress=progress,
         elsewhere_than=places,

@@ -27,7 +27,7 @@ from workbench.fit.threads import on_threads
 from workbench.select.effect_candidates import EffectCandidate, EffectStep, EvaluatedModel, judged_step
 from workbench.select.effect_search import Progress, evaluated
 
-FIRST, MOST = 5, 15
+FIRST_TURN_FORMS, MOST_FORMS = 5, 15
 """Forms fitted in the first turn, and in both."""
 CURVED_BELOW = 0.5
 """Factor on the cost of the valve as it is, below which a form is near enough for its curve to be tried."""
@@ -53,7 +53,7 @@ def searched_forms(
     workers: int,
     progress: Progress,
     on_proposal: Callable[[tuple[str, ...]], None] | None = None,
-    most: int = MOST,
+    most: int = MOST_FORMS,
     elsewhere_than: Collection[str] = (),
 ) -> SearchedForms:
     """Search for a form beside a valve that a recording does not explain.
@@ -101,7 +101,7 @@ class FormSearch:
         on_proposal(tuple(self.forms[each.name].name for each in order))
         models: dict[str, EvaluatedModel | str] = {}
         step = self._judged(models)
-        for turn in filter(None, (order[:FIRST], order[FIRST:most])):
+        for turn in filter(None, (order[:FIRST_TURN_FORMS], order[FIRST_TURN_FORMS:most])):
             models |= self._fitted({each.name: each.points for each in turn})
             step = self._judged(models)
             if curve := self._curve(step):

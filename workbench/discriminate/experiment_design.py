@@ -47,7 +47,7 @@ from workbench.select.experiment import LENGTH_S, MARGIN, MENU, REST_S, Command,
 
 MOST_MOVES = 8
 """Of one experiment."""
-TRIED, KEPT = 25, 2
+TRIED_CHANGES, KEPT = 25, 2
 """Changes tried of each course of the menu that is kept; how many are, changed and as they are."""
 WINDOWS = 3
 """Courses cut out of an input of the menu."""
@@ -223,7 +223,7 @@ def improved(
     score: Callable[[Course], float], course: Course, most: float, bounds: Bounds, generator: np.random.Generator
 ) -> Course:
     """Return a course changed at random, a change kept if it scores more than all before; `most`: as it is."""
-    for _ in range(TRIED):
+    for _ in range(TRIED_CHANGES):
         changed = _changed_inside(course, bounds, generator)
         there = score(changed)
         if there > most:

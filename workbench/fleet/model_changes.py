@@ -18,7 +18,7 @@ from workbench.fleet.valve_course import ValveCourse, complaint_of
 if TYPE_CHECKING:
     from matplotlib.figure import Figure
 
-LEAST = 0.01
+LEAST_TOLD_SHARE = 0.01
 """Of a parameter: less is not told."""
 MOST_DRAWN = 40
 LONGEST_PERCENT = 150.0
@@ -152,7 +152,7 @@ def _parameters(text: str) -> dict[str, float]:
 def _differs(before: float | None, now: float | None) -> bool:
     if before is None or now is None:
         return before is not now
-    return abs(now - before) > LEAST * abs(before)
+    return abs(now - before) > LEAST_TOLD_SHARE * abs(before)
 
 
 def _number(value: float | None) -> str:

@@ -25,8 +25,8 @@ from workbench.imports.export_units import UNITS
 
 MEASURED = ("position", "velocity", "pressure", "load", "current", "force", "torque")
 """How the names of columns begin that are measured."""
-FEWEST = 3
-ALIKE = 1e-2
+FEWEST_CLOCK_ROWS = 3
+ALIKE_STEP = 1e-2
 """Of a step: how alike those of two clocks of the same rows are, each rounded by its program."""
 RATIOS = tuple(each for unit in UNITS["_s"].values() if unit != 1.0 for each in (unit, 1.0 / unit))
 """Of two clocks that count in different units."""
@@ -106,13 +106,15 @@ def joined(path: Path, groups: Sequence[Group]) -> tuple[Column, dict[str, Colum
 def _paired(group: Group, base: Group) -> Group:
     """Return a group by the stem's clock where its own tells the same instants in other words."""
     own_s, stem_s = group.time_s, base.time_s
-    if group.table != base.table or own_s.size != stem_s.size or own_s.size < FEWEST:
+    if group.table != base.table or own_s.size != stem_s.size or own_s.size < FEWEST_CLOCK_ROWS:
         return group
     ratio = float(np.ptp(own_s) / np.ptp(stem_s)) if np.ptp(stem_s) > 0.0 else 0.0
-    if ratio <= 0.0 or not np.allclose(np.diff(own_s), ratio * np.diff(stem_s), rtol=0.0, atol=ALIKE * _step_s(own_s)):
+    if ratio <= 0.0 or not np.allclose(
+        np.diff(own_s), ratio * np.diff(stem_s), rtol=0.0, atol=ALIKE_STEP * _step_s(own_s)
+    ):
         return group
-    told_otherwise = any(abs(ratio / each - 1.0) < ALIKE for each in RATIOS)
-    if abs(ratio - 1.0) < ALIKE:
+    told_otherwise = any(abs(ratio / each - 1.0) < ALIKE_STEP for each in RATIOS)
+    if abs(ratio - 1.0) < ALIKE_STEP:
         if group.origin_s is None or base.origin_s is None:
             told_otherwise = (group.origin_s is None) != (base.origin_s is None)
         else:

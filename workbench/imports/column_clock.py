@@ -49,7 +49,7 @@ BASES = (
     TimeBase("d", 30_000.0, 80_000.0, "days of a workbook", -2_209_161_600.0, 9e-4),
     TimeBase("d", 726_000.0, 753_000.0, "days since the year 0 (datenum)", -719_529.0 * DAY_S, 9e-4),
 )
-MOST = 1e19
+LARGEST_CLOCK_NUMBER = 1e19
 """Numbers of a clock: nanoseconds of 300 years."""
 SURELY = 1e10
 """Numbers from which on a mapping that says another unit is wrong: 300 years of seconds."""
@@ -123,7 +123,7 @@ def clock_of(
         )
     if _unit(first) is not None:
         return Clock(raw * np.array([UNITS["_s"][_unit(cell) or "s"] for cell in cells]), None)
-    if (beyond := np.abs(raw) > MOST).any():
+    if (beyond := np.abs(raw) > LARGEST_CLOCK_NUMBER).any():
         row = int(beyond.argmax())
         raise InputError(str(path), f"line {samples.lines[row]}: {cells[row]!r} in {theirs!r} is no time")
     said = mapped or _in_header(samples, theirs)

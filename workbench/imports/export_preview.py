@@ -13,7 +13,7 @@ from workbench.imports.header_search import SHOWN, Header
 from workbench.imports.proposal import is_clock, proposal, quoted
 from workbench.imports.raw_table import RawTable
 
-FIRST = 3
+FIRST_CELLS = 3
 """Cells of a column that are shown."""
 MOST_TABLES = 5
 
@@ -44,7 +44,7 @@ class ExportPreview:
 
     def _blocks(self) -> list[Block]:
         rows = [
-            (each.name, each.unit or "", *(shown(cell) for cell in (*each.cells, "", "", "")[:FIRST]))
+            (each.name, each.unit or "", *(shown(cell) for cell in (*each.cells, "", "", "")[:FIRST_CELLS]))
             for each in self.columns
         ]
         proposed = " ".join(map(quoted, self.words))

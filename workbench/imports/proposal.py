@@ -29,7 +29,7 @@ Array = npt.NDArray[np.float64]
 STAMP = r"\d{4}-\d\d-\d\d"
 VOLTS = (("1-5V", 0.9, 5.1), ("0-10V", -0.2, 10.3), ("0-5V", -0.1, 5.1), ("2-10V", 1.9, 10.2))
 """Ranges of a signal in volts, by the least and the greatest of it."""
-ALIKE = 0.1
+ALIKE_SPAN_SHARE = 0.1
 """Of a span: two clocks of the same rows go on alike."""
 LEAST_PER_CENT, MOST_SHARE = 3.0, 130.0
 """Between which the greatest of some numbers in % lies: below are shares of 1, or bar."""
@@ -106,7 +106,7 @@ def _finer(clock: ColumnPreview, others: Sequence[ColumnPreview]) -> ColumnPrevi
         return clock
     span_s = _span_s(clock)
     finer = (each for each in others if may_be_clock(each.cells) and not _cut(each))
-    return next((each for each in finer if abs(_span_s(each) - span_s) < ALIKE * span_s), clock)
+    return next((each for each in finer if abs(_span_s(each) - span_s) < ALIKE_SPAN_SHARE * span_s), clock)
 
 
 def _span_s(clock: ColumnPreview) -> float:

@@ -20,7 +20,7 @@ from config.errors import InputError
 
 Array = npt.NDArray[np.float64]
 DAY_S = 86400.0
-TRIED = 2000
+TRIED_ROWS = 2000
 """Rows that a proposed format must read."""
 _DATES = ("%d.%m.%Y", "%d/%m/%Y", "%m/%d/%Y", "%d-%m-%Y", "%m-%d-%Y", "%Y/%m/%d", "%Y.%m.%d")
 _SHORT_DATES = (
@@ -95,7 +95,7 @@ def _unreadable(path: Path, texts: Sequence[str], row: int, line: int, time_form
     said = f"sample {row + 1}: {texts[row]!r} is neither seconds nor an ISO time stamp (2026-01-31T12:00:00.5)"
     if time_format is not None:
         said = f"sample {row + 1} (line {line}): {texts[row]!r} is not as --time-format {time_format!r} says"
-    if proposed := proposed_formats(texts[:TRIED]):
+    if proposed := proposed_formats(texts[:TRIED_ROWS]):
         said += "; it can be read with " + ", or ".join(f'--time-format "{each}"' for each in proposed)
     elif time_format is None:
         said += '; say how it is written, as in --time-format "%d.%m.%Y %H:%M:%S"'

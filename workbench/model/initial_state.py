@@ -20,11 +20,11 @@ from sim.composition import COULOMB, STATIC
 from sim.karnopp import Vector
 from workbench.data.record import Record
 
-STILL = 4.0
+STILL_DEVIATIONS = 4.0
 """Standard deviations of the noise within which the stem stands still."""
 LONGEST_START = 50
 """Samples of the start that are averaged at most."""
-SHORT = 4
+LEAVING_ROWS = 4
 """Samples within which a stem that leaves its place is in motion from the start."""
 CREPT, SURELY = 3.0, 5.0
 """Standard deviations of the noise, and of what is compared, by which a stem that creeps goes in its first samples."""
@@ -69,11 +69,11 @@ def initial_state(record: Record, first: int, end: int, *, moving: bool = True) 
         raise InputError("recording", f"samples {first + 1} to {end}: no position is a number")
     following_m, rows = record.position_m[rows[: 2 * LONGEST_START]], rows[:LONGEST_START]
     position_m, time_s = record.position_m[rows], record.time_s[rows]
-    band_m = STILL * record.scale_m
+    band_m = STILL_DEVIATIONS * record.scale_m
     away = np.abs(position_m - position_m[0]) > 2.0 * band_m
     still = int(away.argmax()) if away.any() else position_m.size
-    in_motion = SHORT if still < SHORT else still if _creeps(following_m, still, record.scale_m) else 0
-    if not in_motion or position_m.size < SHORT or not moving:
+    in_motion = LEAVING_ROWS if still < LEAVING_ROWS else still if _creeps(following_m, still, record.scale_m) else 0
+    if not in_motion or position_m.size < LEAVING_ROWS or not moving:
         return InitialState(float(np.median(position_m[: max(1, still - 1)])), 0.0)
     slope, place = np.polyfit(time_s[:in_motion] - time_s[0], position_m[:in_motion], 1)
     return InitialState(float(place), float(slope))
@@ -94,7 +94,7 @@ def _creeps(position_m: Column, still: int, noise_m: float) -> bool:
 
 def before_start(record: Record, first: int, end: int, place_m: float) -> BeforeStart:
     """Return what the samples around the first of a segment, at rest at a place, m, tell of the pressure before it."""
-    band_m = 2.0 * STILL * record.scale_m
+    band_m = 2.0 * STILL_DEVIATIONS * record.scale_m
     # What was left out as it was in motion lies right before the segment, without a gap.
     unbroken = first > 0 and record.time_s[first] - record.time_s[first - 1] < 1.5 * record.period_s
     if unbroken and record.valid[first - 1] and not any(last == first for _, last in record.segments):

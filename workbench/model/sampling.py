@@ -47,7 +47,7 @@ MOVED = 6.0
 """Noises by which a stem that left its rest has moved."""
 NEGLIGIBLE_N = 0.02
 """Of F_c: a change of the pressure force that moves nothing."""
-ALIKE = 0.05
+ALIKE_PERIOD_SHARE = 0.05
 """Relative difference of the periods of records that are sampled alike."""
 SETTLED_M = 3.0
 """Noises, or that share of F_c, that a rest may shift with what the pressure still does in its first samples."""
@@ -92,7 +92,7 @@ class Sampling:
 
     def of(self, other: Record, valve: ValveParameters) -> "Sampling":
         """Return how another record is simulated: as this one if it is sampled alike."""
-        alike = abs(other.period_s - self.period_s) <= ALIKE * self.period_s
+        alike = abs(other.period_s - self.period_s) <= ALIKE_PERIOD_SHARE * self.period_s
         return self if alike else sampling(other, self.valve or valve)
 
     def told(self) -> "Sampling":

@@ -18,7 +18,7 @@ from workbench.report.charts import Figure, axis, layout
 from workbench.report.plot_series import rounded
 
 TIME_PLACES = 4
-MOST = 700
+MOST_CLOUD_POINTS = 700
 """Points of a cloud."""
 OVER = {"velocity": ("velocity, {}/s (opening +)", "velocity_m_per_s"), "position": ("position, {}", "position_m")}
 
@@ -80,4 +80,4 @@ def _cloud(
 
 
 def _thinned(count: int) -> NDArray[np.int64]:
-    return np.unique(np.linspace(0, max(0, count - 1), min(count, MOST)).astype(np.int64))
+    return np.unique(np.linspace(0, max(0, count - 1), min(count, MOST_CLOUD_POINTS)).astype(np.int64))

@@ -20,11 +20,11 @@ from workbench.data.record import Record
 from workbench.report.charts import Figure, axis, layout
 from workbench.report.plot_series import extremes, rounded, running_s
 
-MOST, MOVING = 2400, 1200
+MOST_LINE_POINTS, MOVING = 2400, 1200
 """Points of a line in the window at most; and while a slider moves it, when it is drawn many times a second."""
 AROUND_S, AROUND = 2.0, 0.5
 """Before and after what is gone to: so many seconds at the least, and this part of a long stretch."""
-BESIDE = 0.5
+BESIDE_SHARE = 0.5
 """Of the window, drawn on either side of it: panning finds something there."""
 LINES = ("measured", "as opened", "fitted", "saved", "model", "error as opened", "error fitted", "error saved", "error",
          "command", "pressure", "model's pressure")  # fmt: skip
@@ -84,7 +84,7 @@ class TimeFigure:
         """Draw the model's pressure, Pa, (n,)."""
         self._lines["model's pressure"] = None if self._by_setpoint else pressure_pa
 
-    def data(self, names: tuple[str, ...] = LINES, most: int = MOST) -> Mapping[str, list[Any]]:
+    def data(self, names: tuple[str, ...] = LINES, most: int = MOST_LINE_POINTS) -> Mapping[str, list[Any]]:
         """Return x and y of these lines in the window, a list each, of so many points at most."""
         drawn = [self._points(self._lines[name], self._unit(name).per_si, most) for name in names]
         return {"x": [x for x, _ in drawn], "y": [y for _, y in drawn]}
@@ -164,7 +164,10 @@ class TimeFigure:
         if values is None:
             return [], []
         width_s = self.window.end_s - self.window.begin_s
-        ends_s = (self.window.begin_s - BESIDE * width_s, self.window.end_s + BESIDE * width_s)
+        ends_s = (
+            self.window.begin_s - BESIDE_SHARE * width_s,
+            self.window.end_s + BESIDE_SHARE * width_s,
+        )
         first, end = np.searchsorted(self._along_s, ends_s)
         first, end = max(0, int(first) - 1), min(self._along_s.size, int(end) + 1)
         rows = first + extremes(values[first:end], most)

@@ -27,7 +27,7 @@ from workbench.report.page import (
     verdict,
     write,
 )
-from workbench.report.plot_series import MOST, stretch
+from workbench.report.plot_series import MOST_SERIES_POINTS, stretch
 from workbench.report.signature_loop import signature
 from workbench.report.units import Reading, Shown, of_stroke, times
 
@@ -174,7 +174,7 @@ def overlaid(figure: Figure, ground: str, samples: int) -> Html:
 
 def thinned(count: int) -> str:
     """Say how a long series is drawn; empty for a short one."""
-    if count <= MOST:
+    if count <= MOST_SERIES_POINTS:
         return ""
     return f" Of every {stretch(count)} samples the least and the greatest are drawn; the figures are of all {count}."
 

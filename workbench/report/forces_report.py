@@ -6,7 +6,7 @@ from pathlib import Path
 import numpy as np
 
 from config.recording import Column
-from workbench.compare.residuals import BINS, FEWEST, Profile, profile
+from workbench.compare.residuals import BINS, FEWEST_BIN_ROWS, Profile, profile
 from workbench.data.imposed_motion import Rows
 from workbench.forces.force_balance import ForceFit, balanced_n, carried_n
 from workbench.forces.force_diagnosis import AT_FLOOR, ForceDiagnosis, ForceStep
@@ -37,7 +37,7 @@ from workbench.report.units import FORCE, Shown, force, parameter, times
 
 DRAWN = 6_000
 """Rows drawn at most."""
-FEW = 200
+LARGE_DOT_ROWS = 200
 """Rows below which a dot is drawn large."""
 BALANCE = {
     "constant_n": "constant force: preload, weight, offsets",
@@ -177,7 +177,7 @@ HOVER = "%{y:.4~g} N at %{x:.4~g} mm"
 
 
 def _dot(colour: str, drawn: Sequence[float | None]) -> Figure:
-    return {"color": colour, "size": 4 if len(drawn) > FEW else 9, "opacity": 0.6}
+    return {"color": colour, "size": 4 if len(drawn) > LARGE_DOT_ROWS else 9, "opacity": 0.6}
 
 
 def _where(diagnosis: ForceDiagnosis) -> Html:
@@ -224,7 +224,7 @@ def _profile(
 
 def _means(over: Column, values: Column) -> Profile:
     """Return the profile, of few readings each of them."""
-    if over.size >= BINS * FEWEST:
+    if over.size >= BINS * FEWEST_BIN_ROWS:
         return profile(over, values)
     order = np.argsort(over)
     return Profile(over[order], values[order], np.zeros(over.size), np.ones(over.size, np.int64))

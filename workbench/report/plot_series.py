@@ -10,9 +10,9 @@ import numpy as np
 from numpy.typing import NDArray
 
 from config.recording import Column
-from workbench.data.record import GAP
+from workbench.data.record import GAP_PERIOD_QUANTILES
 
-MOST = 12_000
+MOST_SERIES_POINTS = 12_000
 """Points drawn of one series at most."""
 
 Rows = NDArray[np.int64]
@@ -34,11 +34,11 @@ def running_s(time_s: Column) -> Column:
     return np.concatenate([[0.0], np.cumsum(np.where(steps > 0.0, steps, period_s))])
 
 
-def drawn(time_s: Column, value: Column, most: int = MOST) -> Drawn:
+def drawn(time_s: Column, value: Column, most: int = MOST_SERIES_POINTS) -> Drawn:
     """Return a series, (n,), as it is drawn, broken where `workbench.data.record` breaks it; time, s, as recorded."""
     steps = np.diff(time_s)
     forward = steps[steps > 0.0]
-    longest_s = GAP * float(np.quantile(forward, 0.95)) if forward.size else np.inf
+    longest_s = GAP_PERIOD_QUANTILES * float(np.quantile(forward, 0.95)) if forward.size else np.inf
     breaks = np.flatnonzero((steps <= 0.0) | (steps > longest_s)) + 1
     along_s = running_s(time_s)
     time_s, value = np.insert(along_s, breaks, along_s[breaks]), np.insert(value, breaks, np.nan)
@@ -67,7 +67,7 @@ def extremes(value: Column, most: int) -> Rows:
     return rows[rows < value.size]
 
 
-def stretch(count: int, most: int = MOST) -> int:
+def stretch(count: int, most: int = MOST_SERIES_POINTS) -> int:
     """Return how many samples of a series longer than `most` stand for two points and a break."""
     return -(-count // (most // 3))
 

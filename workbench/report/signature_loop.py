@@ -13,7 +13,7 @@ from workbench.report.page import Html, plot, section
 from workbench.report.plot_series import extremes, rounded
 from workbench.report.units import Reading
 
-MOST = 6000
+MOST_LOOP_POINTS = 6000
 """Points drawn of one loop at most."""
 TOLD = (
     "Position over command. Friction widens the loop, the spring tilts it, a preload or a sensor's offset shifts it; "
@@ -33,7 +33,7 @@ def signature(command_pa: Column, measured_m: Column, models: Sequence[Simulated
 
 
 def _loop(command_pa: Column, position_m: Column, name: str, colour: str, read: Reading) -> Trace:
-    rows, length, command = extremes(position_m, MOST), read.kind.length, read.kind.command.read
+    rows, length, command = extremes(position_m, MOST_LOOP_POINTS), read.kind.length, read.kind.command.read
     return line(
         rounded(command.factor * command_pa[rows], 5),
         rounded(length.factor * position_m[rows], 4),

@@ -27,7 +27,7 @@ STRUCTURED = 0.1
 SURELY = 10.0
 """Odds of 150 to 1."""
 CLIPPED = 5.0
-FEWEST = 100
+FEWEST_ROWS = 100
 
 Matrix = npt.NDArray[np.float64]
 
@@ -38,7 +38,7 @@ def structure(record: Record, residual_m: Column, negligible_m: float = 0.0) -> 
     What is far below the negligible, m, has none: of a recording without noise what is left is the arithmetic's.
     """
     rows = np.flatnonzero(np.isfinite(residual_m))
-    if rows.size < FEWEST:
+    if rows.size < FEWEST_ROWS:
         return 0.0
     matrix, error = _regressors(record, rows), clipped(residual_m[rows])
     fifths = [slice(-(-k * rows.size // FOLDS), -(-(k + 1) * rows.size // FOLDS)) for k in range(FOLDS)]

@@ -11,7 +11,7 @@ from config.daemon_file import DaemonFile
 from positioner.control.travel.low_pass import LowPass
 from positioner.control.travel.ramp import Ramp
 
-NEAR = 1e-4
+END_BAND_SHARE = 1e-4
 """Of the stroke: an end of the low-pass, below every dead band that is of use (`[control] dead_band` is 5e-4)."""
 
 
@@ -45,7 +45,7 @@ class Course:
         if table.low_pass_s == 0.0 and opening == closing == inf:
             return None
         rates = (closing, opening) if travel.closes else (opening, closing)
-        return cls(LowPass(table.low_pass_s, NEAR * travel.stroke_m), Ramp(*rates))
+        return cls(LowPass(table.low_pass_s, END_BAND_SHARE * travel.stroke_m), Ramp(*rates))
 
     def after(self, before: OnCourse, now_s: float, from_m: float, asked_m: float) -> OnCourse:
         """Return where it is by now on its way from the reference in force to the one asked for, m."""

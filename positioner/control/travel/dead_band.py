@@ -16,7 +16,7 @@ from config.daemon_file import LEAST_DEAD_BAND
 from positioner.estimation.acceptance import Ratios
 from positioner.estimation.estimates import Estimate
 
-MOST = 0.02
+WIDEST_DEAD_BAND_SHARE = 0.02
 """Of the stroke: more is no positioner."""
 DEVIATIONS = 3.0
 """Of the noise: one sample in 400 lies farther off."""
@@ -48,7 +48,7 @@ class DeadBand:
             return self.fixed_m
         jump_m = self._jump_m(breakaway, ratios, longest_jump_m) if self.jumps else 0.0
         wanted_m = max(LEAST_DEAD_BAND * self.stroke_m, DEVIATIONS * noise_m, HALF * jump_m)
-        return min(wanted_m, MOST * self.stroke_m)
+        return min(wanted_m, WIDEST_DEAD_BAND_SHARE * self.stroke_m)
 
     @staticmethod
     def _jump_m(breakaway: Estimate, ratios: Ratios | None, longest_m: float) -> float:

@@ -191,7 +191,7 @@ def _counted(counts: tuple[int, ...], edges: tuple[float, ...], value: float) ->
 
 FEWEST_DAYS = 5
 """That tell a trend."""
-STEADY = 0.002
+SAME_END_STROKE_SHARE = 0.002
 """Of the stroke, within which an end position is the same."""
 SURE = 2.0
 """Deviations of Kendall's S, one in twenty by chance."""
@@ -208,10 +208,10 @@ def end_trend(means: list[float]) -> EndTrend:
     n = len(known)
     if n < FEWEST_DAYS:
         return EndTrend.NOT_KNOWN
-    if max(known) - min(known) <= STEADY:
+    if max(known) - min(known) <= SAME_END_STROKE_SHARE:
         return EndTrend.STEADY
     middle = median(known[:-1])
-    scatter = max(median(abs(each - middle) for each in known[:-1]), 0.25 * STEADY)
+    scatter = max(median(abs(each - middle) for each in known[:-1]), 0.25 * SAME_END_STROKE_SHARE)
     if abs(known[-1] - middle) > JUMPS * scatter and max(known[:-1]) - min(known[:-1]) <= abs(known[-1] - middle):
         return EndTrend.JUMPED
     s = sum((known[j] > known[i]) - (known[j] < known[i]) for i in range(n) for j in range(i + 1, n))

@@ -19,7 +19,7 @@ TOGETHER_S = 60.0
 GROWN_EVERY_S = 10.0
 """How often a row that only counts on is written."""
 PEER = re.compile(r"(?:(?P<who>.*) \((?P<role>[a-z]+)\) at )?(?P<peer>[^ ]+)", re.DOTALL)
-LONGEST = 500
+LONGEST_TEXT_CHARACTERS = 500
 """Characters of a text."""
 
 
@@ -106,7 +106,7 @@ class AuditedWrites:
 
 def _storable(text: str) -> str:
     """Return a text as a file may hold it: of moderate length, and no half characters."""
-    short = text if len(text) <= LONGEST else f"{text[:LONGEST]}.."
+    short = text if len(text) <= LONGEST_TEXT_CHARACTERS else f"{text[:LONGEST_TEXT_CHARACTERS]}.."
     return short.encode("utf-8", "replace").decode("utf-8")
 
 

@@ -11,7 +11,7 @@ from positioner.estimation.estimates import Directions
 from positioner.estimation.landings.breakaway_distance import BreakawayDistance, Interval
 from positioner.estimation.landings.landing_detector import Answers, SlideOutcome
 
-MOST = 40
+MOST_LANDINGS = 40
 """Landings, and changes that held."""
 Row = tuple[float, float, float]
 Place = Annotated[float, Field(ge=-1e3, le=1e3)]
@@ -57,8 +57,8 @@ class KnowledgeRecord(_Record):
     """In which friction is known; what was kept before it was said counted as both."""
     covariance: list[list[Figure]] = Field(min_length=3, max_length=3)
     residual_m: Length
-    landings: list[_Slide] = Field(max_length=MOST)
-    held: list[_Slide] = Field(max_length=MOST)
+    landings: list[_Slide] = Field(max_length=MOST_LANDINGS)
+    held: list[_Slide] = Field(max_length=MOST_LANDINGS)
     answers: list[Annotated[float, Field(ge=0.0, le=1e9)]] = Field(min_length=3, max_length=3)
     distances: list[_Interval] | None = Field(min_length=4, max_length=4)
     tracked: dict[str, Figure]
@@ -74,8 +74,8 @@ def record_of(knowledge: ValveKnowledge) -> dict[str, Any]:
         "directions": ratios.directions.name,
         "covariance": [list(row) for row in knowledge.covariance],
         "residual_m": knowledge.residual_m,
-        "landings": [each._asdict() for each in knowledge.landings[:MOST] if _finite(each)],
-        "held": [each._asdict() for each in knowledge.held[:MOST] if _finite(each)],
+        "landings": [each._asdict() for each in knowledge.landings[:MOST_LANDINGS] if _finite(each)],
+        "held": [each._asdict() for each in knowledge.held[:MOST_LANDINGS] if _finite(each)],
         "answers": list(knowledge.answers),
         "distances": None if knowledge.distances is None else [_kept(each) for each in knowledge.distances.all],
         "tracked": dict(knowledge.tracked),

@@ -29,11 +29,11 @@ LOWER, RAISE = 0.5, 1.3
 """Factors on a distance as long as nothing has held, and where what broke loose holds."""
 GROWS = 2.0
 """Factor, at most, from what held to what is tried next: what broke loose may have been far longer than needed."""
-ALIKE = 1.25
+KIN_FACTOR = 1.25
 """Factor by which kin may differ: what holds one, less that, holds the other."""
 CLOSE = 1.1
 """Broke over held: near enough, nothing between them is tried."""
-BESIDE = 1.05
+CONTRADICTED_BOUND_FACTOR = 1.05
 """Factor to a bound that a slide has contradicted."""
 FADES = 0.999
 """Factor on held with each slide that breaks loose: a shorter way is tried again after some hundred."""
@@ -97,12 +97,12 @@ class Interval:
         """Return it after a way, m, that broke loose."""
         if way_m > LONG * self.broke_m:
             return self
-        held_m = FADES * self.held_m if way_m > self.held_m else way_m / BESIDE
+        held_m = FADES * self.held_m if way_m > self.held_m else way_m / CONTRADICTED_BOUND_FACTOR
         return Interval(held_m, min(self.broke_m, way_m), self.seen or way_m <= self.broke_m)
 
     def holding(self, way_m: float) -> "Interval":
         """Return it after a way, m, that held."""
-        if self.broke_m > BESIDE * way_m:
+        if self.broke_m > CONTRADICTED_BOUND_FACTOR * way_m:
             return replace(self, held_m=max(self.held_m, way_m))
         if self.seen:  # one such may be luck
             return Interval(max(self.held_m, way_m / RAISE), RAISE * way_m)
@@ -128,7 +128,7 @@ class Interval:
             return self
         better = kin.seen >= self.seen if kin.broke_m < self.broke_m else kin.seen > self.seen
         broke_m, seen = (kin.broke_m, kin.seen) if better else (self.broke_m, self.seen)
-        held_m = kin.held_m if better else kin.held_m / ALIKE
+        held_m = kin.held_m if better else kin.held_m / KIN_FACTOR
         return Interval(self.held_m or (held_m if held_m < broke_m else 0.0), broke_m, seen)
 
 

@@ -31,7 +31,7 @@ UNDER_WAY = 0.01
 """Of the stroke: a stem that went so far before it rests has answered."""
 PRECISE, LONG = 2e-4, 60
 """Of the stroke: a rest known no better is averaged on, up to so many samples."""
-ENOUGH = 400
+WATCHED_REST_SAMPLES = 400
 """Samples of a rest, after which it is only watched."""
 STOP = 0.01
 """Of the stroke: as near as this to an end it may be a stop."""
@@ -206,7 +206,7 @@ class LandingDetector:
         if not arrived:
             self._level_s = time_s
             self._window.restart(time_s, self._from_m)
-        if self.rest is None or self.rest.count < ENOUGH:
+        if self.rest is None or self.rest.count < WATCHED_REST_SAMPLES:
             self._window.add(time_s, position_m, pressure_pa, self._no_answer_m_per_s)
         rest, known = self._window.rest, self.rest
         if known is not None:

@@ -25,7 +25,7 @@ SURE = 2.0
 """Times three deviations, for the instant is sought, and a law that is bent looks like a small shift."""
 LEAST_SHIFT = 2e-3
 """Of the stroke: a smaller shift counts as none."""
-ENOUGH = 10
+FEWEST_BEND_LANDINGS = 10
 """Landings: fewer say nothing of a bend."""
 
 
@@ -42,7 +42,7 @@ def shifted(landings: Iterable[SlideOutcome], stroke_m: float) -> bool:
         return False
     share, way = X[:, 0], X[:, 1] + X[:, 2]
     bent = np.column_stack((X, share**2, way * share))
-    return len(ordered) < ENOUGH or _shift_in(bent, p)
+    return len(ordered) < FEWEST_BEND_LANDINGS or _shift_in(bent, p)
 
 
 def _shift_in(X: Array, p: Array) -> bool:

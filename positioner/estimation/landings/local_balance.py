@@ -37,7 +37,7 @@ FADING = 0.7
 """ρ"""
 HELD_BACK = 0.1
 """w_0"""
-LATEST = 3
+LATEST_LANDINGS = 3
 """Landings in a direction, of which l_s is taken."""
 BENDS = (0.05, 0.05, 0.05, 0.1, 0.04, 0.03)
 """Of the pressure over the stroke: standard deviations of q, the root of P."""
@@ -45,7 +45,7 @@ SHORT, SHORTEST = 3.0, 0.5
 """Of the shortest slide: one that went as far counts half; of F_c/k_s: the shortest is taken for no longer."""
 SAME = 1e-9
 """m: positions nearer than this are one."""
-FEWEST = 5
+FEWEST_BEND_LANDINGS = 5
 """Landings: fewer do not say how they are bent."""
 FADES = 0.97
 """Factor on the weight from landing to landing."""
@@ -158,7 +158,7 @@ _STRAIGHT = (0.0,) * len(BENDS)
 @lru_cache(maxsize=4)
 def _bend(ratios: Ratios, landings: tuple[SlideOutcome, ...], stroke_m: float) -> _Bend:
     """Return what landings say; q is zeros where there are too few."""
-    if len(landings) < FEWEST:
+    if len(landings) < FEWEST_BEND_LANDINGS:
         return _Bend(_STRAIGHT, FINEST * -ratios.b_over_c * stroke_m, tuple(_few(landings, ratios)))
     s = np.array([float(each.direction) for each in landings])
     t = np.array([2.0 * each.position_m / stroke_m - 1.0 for each in landings])
@@ -211,7 +211,7 @@ def _way(landed: Sequence[tuple[SlideOutcome, float]], slope_pa_per_m: float) ->
         off_pa + each.direction * slope_pa_per_m * jumped_m(slide.sent_m, slides)
         for (each, off_pa), slide in zip(slid, slides, strict=True)
     ]
-    lately_pa = _alike(left_pa[:LATEST])
+    lately_pa = _alike(left_pa[:LATEST_LANDINGS])
     return _Way(
         lately_pa, slides, tuple(each.position_m for each, _ in slid), tuple(each - lately_pa for each in left_pa)
     )
@@ -225,7 +225,7 @@ def _scatter_pa(ways_pa: Iterable[Array]) -> float:
 
 def _alike(missed_pa: Sequence[float]) -> float:
     """Return what all have in common: the least of them, if all have one sign."""
-    if len(missed_pa) < LATEST:
+    if len(missed_pa) < LATEST_LANDINGS:
         return 0.0
     return max(0.0, min(missed_pa)) + min(0.0, max(missed_pa))
 

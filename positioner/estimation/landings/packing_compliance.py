@@ -15,7 +15,7 @@ from typing import NamedTuple
 
 from positioner.estimation.landings.landing_detector import SlideOutcome
 
-FADING, LATEST = 0.5, 6
+FADING, LATEST_CHANGES = 0.5, 6
 """ρ, and how many changes count."""
 SURE = 3.0
 """Deviations of the way beyond which the packing has given way at all."""
@@ -49,7 +49,7 @@ def compliance(held: Sequence[SlideOutcome], direction: int) -> Compliance | Non
         (each.position_m - each.from_m, each.command_pa - each.from_pa, each.std_m)
         for each in held
         if each.direction == direction and each.from_pa is not None and each.command_pa != each.from_pa
-    ][:LATEST]
+    ][:LATEST_CHANGES]
     if not changes:
         return None
     weights = [FADING**age for age in range(len(changes))]

@@ -14,7 +14,7 @@ from math import isnan
 
 import numpy as np
 
-FEWEST, MOST = 4, 40
+FEWEST_RESTS, MOST_RESTS = 4, 40
 """Rests: before there are so many nothing is known; so many are remembered."""
 ALIKE, SCATTERED, BEYOND = 0.05, 6.0, 0.2
 
@@ -23,7 +23,7 @@ class PressureDelivered:
     """The commands at rests and the pressures measured there, the last ones."""
 
     def __init__(self) -> None:
-        self._pairs_pa: deque[tuple[float, float]] = deque(maxlen=MOST)
+        self._pairs_pa: deque[tuple[float, float]] = deque(maxlen=MOST_RESTS)
 
     def add(self, command_pa: float, pressure_pa: float) -> None:
         """Take what belongs together, Pa; NaN: it is not measured."""
@@ -32,7 +32,7 @@ class PressureDelivered:
 
     def agrees(self, command_pa: float, pressure_pa: float) -> bool:
         """Whether a pressure measured at a rest can be the one commanded, Pa; where nothing is known, it can."""
-        if isnan(pressure_pa) or len(self._pairs_pa) < FEWEST:
+        if isnan(pressure_pa) or len(self._pairs_pa) < FEWEST_RESTS:
             return True
         u, p = np.array(self._pairs_pa).T
         one, other = np.triu_indices(u.size, 1)

@@ -6,7 +6,7 @@ An outage of the replies, a daemon that stood still: what happened meanwhile, an
 stands but for one interval, and a stem that came to rest in the dark has taken no longer than it was watched.
 """
 
-GAP = 3.0
+GAP_USUAL_INTERVALS = 3.0
 """Usual intervals: a sample or two that are lost are none."""
 POOLED, LENGTHENED = 0.1, 1.25
 """Weight of a new interval in the usual one; factor on that with each gap: a loop may have become slower."""
@@ -26,7 +26,7 @@ class SeenTime:
             interval_s = time_s - self._last_s
             if self._usual_s is None:
                 self._usual_s = interval_s
-            elif interval_s > GAP * self._usual_s:
+            elif interval_s > GAP_USUAL_INTERVALS * self._usual_s:
                 self._unseen_s += interval_s - self._usual_s
                 self._usual_s *= LENGTHENED
             else:

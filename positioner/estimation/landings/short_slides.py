@@ -22,7 +22,7 @@ FADING, HELD_BACK = 0.9, 0.5
 """ρ, v_0"""
 HALF, STEPS = 0.5, 6
 """Of the way to a solution, and how many: d rises with a, but may hardly do so."""
-LEAST = 0.25
+LEAST_SENT_SHARE = 0.25
 """Of how far a slide is to go: it is sent no less."""
 
 
@@ -45,7 +45,7 @@ def sent(slides: Iterable[tuple[SlideOutcome, float]], slope_pa_per_m: float) ->
 
 def _sent(slide: SlideOutcome, off_pa: float, slope_pa_per_m: float) -> Sent:
     went_m, beyond_m = abs(slide.position_m - slide.from_m), -slide.direction * off_pa / slope_pa_per_m
-    return Sent(max(LEAST * went_m, went_m - beyond_m), beyond_m)
+    return Sent(max(LEAST_SENT_SHARE * went_m, went_m - beyond_m), beyond_m)
 
 
 def jumped_m(sent_m: float, slides: Sequence[Sent]) -> float:
@@ -60,5 +60,5 @@ def beyond_m(way_m: float, slides: Sequence[Sent]) -> float:
     """Return g of a slide that is to go a way d, m: it is to be sent less by that."""
     sent_m = way_m
     for _ in range(STEPS):
-        sent_m = max(LEAST * way_m, sent_m + HALF * (way_m - sent_m - jumped_m(sent_m, slides)))
+        sent_m = max(LEAST_SENT_SHARE * way_m, sent_m + HALF * (way_m - sent_m - jumped_m(sent_m, slides)))
     return way_m - sent_m

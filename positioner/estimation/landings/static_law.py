@@ -40,7 +40,7 @@ from positioner.estimation.landings.local_balance import bent_by_pa
 from positioner.estimation.landings.parting import FINEST
 from positioner.estimation.landings.swing import balanced, swing_of
 
-FEWEST, FEWEST_EACH = 5, 2
+FEWEST_LANDINGS, FEWEST_EACH = 5, 2
 """Landings in all, and in each direction."""
 LARGEST_RELATIVE_STD = 0.05
 """Of κ."""
@@ -149,13 +149,13 @@ def static_law(landings: Sequence[SlideOutcome], stroke_m: float) -> StaticLaw:
         stroke_m: full travel, m.
     """
     ups = sum(each.direction > 0 for each in landings)
-    if len(landings) < FEWEST or min(ups, len(landings) - ups) < FEWEST_EACH:
+    if len(landings) < FEWEST_LANDINGS or min(ups, len(landings) - ups) < FEWEST_EACH:
         return no_static_law(Refusal.LANDINGS_TOO_FEW, tuple(landings))
     X, p = columns(landings, stroke_m)
     slid = _slides(landings, X, p, stroke_m)
     slides = tuple(compress(landings, slid.tolist()))
     ups, kept = sum(each.direction > 0 for each in slides), len(slides)
-    if kept < FEWEST or min(ups, kept - ups) < FEWEST_EACH:
+    if kept < FEWEST_LANDINGS or min(ups, kept - ups) < FEWEST_EACH:
         return no_static_law(Refusal.LANDINGS_TOO_FEW, slides)
     swing, swing_std = swing_of(slides, X[slid], p[slid], stroke_m)
     ways = np.array([(each.position_m - each.from_m) / stroke_m for each in slides])
@@ -213,7 +213,7 @@ def _slides(landings: Sequence[SlideOutcome], X: Array, p: Array, stroke_m: floa
     went_m = way * (X[:, 0] * stroke_m - from_m)
     slides = np.ones(p.size, dtype=bool)
     for _ in range(ROUNDS):
-        if np.count_nonzero(slides) < FEWEST or np.linalg.matrix_rank(X[slides], tol=1e-3) < 3:
+        if np.count_nonzero(slides) < FEWEST_LANDINGS or np.linalg.matrix_rank(X[slides], tol=1e-3) < 3:
             return slides
         theta, _weights = _huber(X[slides], p[slides])
         per_m = theta[0] / stroke_m

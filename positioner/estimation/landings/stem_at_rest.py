@@ -40,9 +40,9 @@ import numpy as np
 
 from positioner.estimation.array import Array
 
-MOST = 512
+MOST_ROWS = 512
 """Rows kept; when they are full, each becomes the mean of two."""
-FEWEST = 4
+FEWEST_SECOND_HALF_ROWS = 4
 """Rows in the second half."""
 TOLERANCE = 1e-4
 """Of the stroke: motion smaller than this is none."""
@@ -128,7 +128,7 @@ class RestWindow:
             self._append(time_s - self._start_s, position_m, pressure_pa)
         else:
             self._add_up(time_s - self._start_s, position_m, pressure_pa)
-        if time_s >= self._look_s and len(self._times_s) >= 2 * FEWEST:
+        if time_s >= self._look_s and len(self._times_s) >= 2 * FEWEST_SECOND_HALF_ROWS:
             self._look_s = self._start_s + LOOKED_AGAIN * (time_s - self._start_s)
             self.rest = self._rest(no_answer())
 
@@ -137,7 +137,7 @@ class RestWindow:
         self._times_s.append(after_s)
         self._positions_m.append(position_m)
         self._pressures_pa.append(pressure_pa)
-        if len(self._times_s) == MOST:
+        if len(self._times_s) == MOST_ROWS:
             self._times_s, self._positions_m, self._pressures_pa = (
                 _of_pairs(each) for each in (self._times_s, self._positions_m, self._pressures_pa)
             )
@@ -178,7 +178,7 @@ class RestWindow:
         time_s, position_m, pressure_pa = map(np.frombuffer, (self._times_s, self._positions_m, self._pressures_pa))
         half = int(time_s.searchsorted(0.5 * time_s[-1]))
         late_m = position_m[half:]
-        if late_m.size < FEWEST:
+        if late_m.size < FEWEST_SECOND_HALF_ROWS:
             return None
         noise_m = _noise(late_m)
         if self._variance_m2 is not None and late_m.size < FEW:

@@ -28,7 +28,7 @@ from positioner.estimation.array import Array
 from positioner.estimation.landings.landing_detector import SlideOutcome
 from positioner.estimation.landings.parting import FINEST, best_parting
 
-FEWEST = 8
+FEWEST_SWING_LANDINGS = 8
 """Landings."""
 DEVIATIONS = 6.0
 FALL = 0.67
@@ -47,7 +47,7 @@ def swing_of(landings: Sequence[SlideOutcome], X: Array, p: Array, stroke_m: flo
         X, p: their columns, (n, 3), and pressures, (n,), Pa.
         stroke_m: full travel.
     """
-    if len(landings) < FEWEST:
+    if len(landings) < FEWEST_SWING_LANDINGS:
         return NONE
     ways = np.array([(each.position_m - each.from_m) / stroke_m for each in landings])
     rho, std, residual_pa = _swing(ways, X, p)

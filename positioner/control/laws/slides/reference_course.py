@@ -53,7 +53,7 @@ COMING = 8
 """N"""
 A_TREND = 3
 """Changes in one direction."""
-STEPS_ALIKE, ALIKE = 4, 2.0
+STEPS_ALIKE, ALIKE_STEP_FACTOR = 4, 2.0
 """Steps that are a slow ramp; by which factor they and their intervals may differ: steps of a hand hardly do so."""
 
 
@@ -94,7 +94,7 @@ class ReferenceCourse:
             return 0.0
         ways_m, intervals_s = zip(*self.steps, strict=True)
         least_m, most_m = sorted((min(ways_m), max(ways_m)), key=abs)
-        alike = 0.0 < most_m / least_m <= ALIKE and max(intervals_s) <= ALIKE * min(intervals_s)
+        alike = 0.0 < most_m / least_m <= ALIKE_STEP_FACTOR and max(intervals_s) <= ALIKE_STEP_FACTOR * min(intervals_s)
         goes_on = now_s - self.changed_s <= OVERDUE * max(intervals_s)
         return abs(sum(ways_m)) / sum(intervals_s) if alike and goes_on else 0.0
 

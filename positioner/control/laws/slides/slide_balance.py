@@ -26,7 +26,7 @@ KNOWN = 1e-3
 """Of the stroke: how well an extended valve is known."""
 SURE = 1.02
 """Factor on a margin that is known: a slide of just that length may hold."""
-BESIDE = 0.02
+SLOPE_REACH_SHARE = 0.02
 """Of the stroke, to either side: by what is between, a slope is known."""
 FLATTEST = 0.25
 """Of the slope of the straight law, and of its friction: no valve has less of it anywhere."""
@@ -91,9 +91,9 @@ class Balance:
         """Return what margins of slides that go on are in proportion to, m: m_s of an extended valve, or φ/κ."""
         if self.valve is not None:
             return max(SURE * self.valve.margin_m(position_m, direction), VISIBLE * self.stroke_m)
-        there_m = [position_m + each * BESIDE * self.stroke_m for each in (-1, 1)]
+        there_m = [position_m + each * SLOPE_REACH_SHARE * self.stroke_m for each in (-1, 1)]
         down_pa, up_pa = (sum(self._shape_pa(each, s) for s in (1, -1)) for each in there_m)
-        straight_pa = -self.ratios.b_over_c * 4 * BESIDE * self.stroke_m
+        straight_pa = -self.ratios.b_over_c * 4 * SLOPE_REACH_SHARE * self.stroke_m
         return self.friction_at_m(position_m) / max(FLATTEST, (up_pa - down_pa) / straight_pa)
 
     def local(self, position_m: float) -> Local:
