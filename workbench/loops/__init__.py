@@ -12,8 +12,7 @@ answers: sticks (how much, how sure), something else (what), cannot be told (why
     quality_gates       what a record cannot tell, before anything is worked out
     oscillation         the period and how regular it is; the time scale of a loop
     controller_law      the PI law, seen in OP against SP - PV
-    stem_landings       where a sticking stem rests, told the output
-    process_response    PV as the process makes it of a stem: lag, dead time, gain, coloured disturbance
+    stem_and_process    PV as a stem and a process make it of OP, and how likely that is, compiled
     causes              causes held against each other by likelihood
     calibration         from evidence to the probability that the valve sticks
     shape_methods       methods of the literature, which vote beside it

@@ -1,12 +1,14 @@
 """Causes held against each other by the likelihood of PV, each told the output that is on record.
 
-    friction        PV answers a stem that rests and slips (stem_landings)
+    friction        PV answers a stem that rests and slips
     linear          PV answers the output itself: tight tuning, or a disturbance that a valve without fault corrects
     nonlinear       PV answers a curve of the output that rises throughout, u, u^2 and u^3: a characteristic
     disturbance     PV answers nothing: all of it comes from outside
 
-The evidence for friction is what it is better by than the best of the others, in nats. A gain of PV against the
-controller's action is refused: it would be the controller's own law read backwards, PV told from the OP that it made.
+The evidence for friction is the logarithm of its mean likelihood over all stems that would rule the loop, and all
+processes, less that of the best other cause: what is tried more often fits better by chance, and a mean pays for it.
+Friction that is small against the output's swing is none of these: where the record shows a valve that follows closely,
+the evidence is therefore negative, and where it shows nothing, 0.
 """
 
 from dataclasses import dataclass
@@ -14,30 +16,35 @@ from dataclasses import dataclass
 import numpy as np
 import numpy.typing as npt
 
-from workbench.loops.loop_record import Array, LoopRecord
+from workbench.loops.loop_record import Array, LoopRecord, averaged
 from workbench.loops.oscillation import Oscillation
-from workbench.loops.process_response import (
-    Response,
-    Scale,
-    averaged,
-    disturbance_alone,
-    fit_responses,
-    refine_responses,
-    respond,
-    shaped_cost,
-)
-from workbench.loops.stem_landings import rest_positions
+from workbench.loops.stem_and_process import cost_of, costs_of_stems, respond, rest_positions
 from workbench.loops.thresholds import LIMITS
 
-SHARES = (0.05, 0.1, 0.17, 0.25, 0.34, 0.44, 0.55, 0.66, 0.77, 0.87, 0.95)
-"""Apparent stiction that is tried, of the output's span: beyond the span the stem never moves."""
+SHARES = (0.12, 0.17, 0.24, 0.33, 0.44, 0.55, 0.66, 0.77, 0.87, 0.95)
+"""Apparent stiction that is tried, of the output's span: less does not rule a loop, beyond it the stem never moves."""
 JUMPS = (0.0, 0.5, 1.0)
 """Slip jump that is tried, of the apparent stiction."""
+LAGS = (0.0, 0.05, 0.12, 0.3, 0.8, 4.0)
+DELAYS = (0.0, 0.05, 0.1, 0.17, 0.25)
+"""In cycles of the loop; a quarter of a cycle of delay and a quarter of lag is all that a PI loop leaves a process."""
+LONGER, LATER = (0.7, 1.0, 1.4), (-0.025, 0.0, 0.025)
+"""Factors of the lag, and cycles of delay, about the best."""
 NEARER = ((0.12, 0.25), (0.05, 0.12), (0.02, 0.05))
 """Steps of S, of itself, and of J, of S, about the best, one round after the other: slips make the cost rough."""
 ABOUT = (-2.0, -1.0, 0.0, 1.0, 2.0)
-LEAST_MOTION = 0.1
-"""Of the output's standard deviation: a stem that moves less explains no PV."""
+MORE_WEIGHTS = 3.0
+"""Nats that two more weights of a response cost, as a mean over what they may be would."""
+
+
+@dataclass(frozen=True, slots=True)
+class Process:
+    """What a process makes of a stem: its cost, nats, less is better; lag and delay, rows of the stem; its gain."""
+
+    cost: float
+    lag: float
+    delay: int
+    gain: float
 
 
 @dataclass(frozen=True, slots=True)
@@ -48,8 +55,7 @@ class Friction:
         stiction_pct, low_pct, high_pct: apparent stiction S and its 95 % interval, % of the output.
         slip_jump_pct: J, likewise.
         slides_on: whether the stem follows after a slip until the output turns.
-        share: of the output's span that S is.
-        response: of the process, lag and delay in rows; its gain in standard deviations of PV a one of OP.
+        process: what the process makes of it.
     """
 
     stiction_pct: float
@@ -57,48 +63,47 @@ class Friction:
     high_pct: float
     slip_jump_pct: float
     slides_on: bool
-    share: float
-    response: Response
+    process: Process
 
 
 @dataclass(frozen=True, slots=True)
 class Causes:
-    """Costs by cause, nats, less is better; what is best of friction; how the rows were made."""
+    """Causes held against each other.
+
+    Attributes:
+        costs: of the best of each cause, nats, less is better.
+        evidence: for friction against the best of the others, nats.
+        explained: what friction explains beyond the disturbance alone, likewise.
+        friction: the best of it.
+        lag_s, delay_s, gain: of the process; the gain in PV a % of the output.
+    """
 
     costs: dict[str, float]
-    friction: Friction | None
-    linear: Response
-    scale: Scale
+    evidence: float
+    explained: float
+    friction: Friction
     lag_s: float
     delay_s: float
     gain: float
 
-    @property
-    def evidence(self) -> float:
-        """What friction is better by than the best of the others, nats."""
-        return min(cost for name, cost in self.costs.items() if name != "friction") - self.costs["friction"]
-
-    @property
-    def share(self) -> float:
-        """What friction alone explains, of all that the output explains of PV with it, 0 to 1."""
-        return min(1.0, max(0.0, self.evidence) / self.explained) if self.explained > 0.0 else 0.0
-
-    @property
-    def explained(self) -> float:
-        """What friction explains beyond the disturbance alone, nats; 0 where no stem is allowed."""
-        return max(0.0, self.costs["disturbance"] - self.costs["friction"]) if self.friction else 0.0
-
 
 @dataclass(frozen=True, slots=True)
 class Rows:
-    """Output in rows of the stem, (m,), PV in rows of the comparison, (n,), both of unit variance."""
+    """Output in rows of the stem, (m,), PV in rows of the comparison, (n,), both of unit variance.
+
+    Attributes:
+        period_s: of a row of the stem.
+        cycle: rows of the stem a cycle.
+        coarse: of them to a row of the comparison.
+    """
 
     output: Array
     pv: Array
     output_pct: float
     pv_unit: float
     period_s: float
-    scale: Scale
+    cycle: float
+    coarse: int
 
 
 def rows_of(record: LoopRecord, oscillation: Oscillation) -> Rows:
@@ -117,46 +122,92 @@ def rows_of(record: LoopRecord, oscillation: Oscillation) -> Rows:
         output_pct,
         pv_unit,
         first * record.period_s,
-        Scale(cycle / first, coarse),
+        cycle / first,
+        coarse,
     )
+
+
+@dataclass(frozen=True, slots=True)
+class _Trials:
+    """Stems that were tried, g of them: S and J in the unit of the rows, manner; costs and gains, (g, l, d)."""
+
+    stiction: Array
+    slip_jump: Array
+    slides_on: npt.NDArray[np.bool_]
+    lags: Array
+    delays: npt.NDArray[np.int64]
+    costs: Array
+    gains: Array
+
+    def best(self, among: npt.NDArray[np.bool_] | None = None) -> tuple[int, Process]:
+        """Return the place of the best stem, of those that may be, and its process."""
+        costs = self.costs if among is None else np.where(among[:, None, None], self.costs, np.inf)
+        stem, lag, delay = (int(each) for each in np.unravel_index(int(np.argmin(costs)), costs.shape))
+        at = (stem, lag, delay)
+        return stem, Process(
+            float(self.costs[at]), float(self.lags[lag]), int(self.delays[delay]), float(self.gains[at])
+        )
+
+    @property
+    def mean_likelihood(self) -> float:
+        """Logarithm of the mean likelihood, nats."""
+        least = float(self.costs.min())
+        return float(np.log(np.exp(least - self.costs).mean())) - least
 
 
 def hold_causes(record: LoopRecord, oscillation: Oscillation, action: int) -> Causes:
     """Return the causes of what a loop does; `action` is the sign that the process's gain must have, 0 if unknown."""
     rows = rows_of(record, oscillation)
-    scale, pv, output = rows.scale, rows.pv, rows.output
-    (linear,) = fit_responses(output[:, None], pv, scale, action)
-    (linear,) = refine_responses(output[:, None], pv, scale, action, linear)
-    friction = _friction(rows, action)
-    responses = [linear] + ([friction.response] if friction else [])
-    curved = np.stack([output, output**2, output**3], axis=1)
-    span = np.linspace(float(output.min()), float(output.max()), 50)
-
-    def rises(weights: Array) -> bool:
-        return float(weights.sum()) * action >= 0.0
-
-    def is_characteristic(weights: Array) -> bool:
-        slope = weights[0] + 2.0 * weights[1] * span + 3.0 * weights[2] * span**2
-        return bool((slope * (action or np.sign(slope.mean())) >= 0.0).all())
-
+    none = np.zeros(1)
+    plain = _try(rows, none, none, none > 0.0, action)
+    sizes, ratios, manners = (
+        each.ravel()
+        for each in np.meshgrid(np.ptp(rows.output) * np.array(SHARES), JUMPS, [False, True], indexing="ij")
+    )
+    trials = _try(rows, sizes, sizes * ratios, manners, action)
+    alone = cost_of(np.zeros((0, rows.pv.size)), rows.pv)[0]
+    processes = [plain.best()[1], trials.best()[1]]
+    phases = min(_of_phases(rows, each, action) for each in processes)
+    curved = min(_of_curve(rows, each, action) for each in processes)
+    friction = _refined(rows, trials, action)
     costs = {
-        "friction": friction.response.cost if friction else np.inf,
-        "linear": min(linear.cost, *(shaped_cost(_paths(output, scale, each), pv, rises) for each in responses)),
-        "nonlinear": min(
-            shaped_cost(respond(curved, scale, each.lag, each.delay), pv, is_characteristic) for each in responses
-        ),
-        "disturbance": disturbance_alone(pv),
+        "friction": friction.process.cost,
+        "linear": min(alone, phases, float(plain.costs.min())),
+        "nonlinear": min(alone, curved),
+        "disturbance": alone,
     }
-    best = friction.response if friction and costs["friction"] < costs["linear"] else linear
+    others = max(plain.mean_likelihood, -alone, -phases - MORE_WEIGHTS, -curved - MORE_WEIGHTS)
+    best = friction.process if costs["friction"] < costs["linear"] else processes[0]
     return Causes(
         costs,
+        trials.mean_likelihood - others,
+        max(0.0, trials.mean_likelihood + alone),
         friction,
-        linear,
-        scale,
-        best.lag * scale.coarse * rows.period_s,
+        best.lag * rows.period_s,
         best.delay * rows.period_s,
         best.gain * rows.pv_unit / rows.output_pct,
     )
+
+
+def _of_phases(rows: Rows, process: Process, action: int) -> float:
+    """Return the cost of a sum of the response to the output and the same a tenth and a fifth of a cycle later.
+
+    It has any phase: no stem is preferred because a process has two lags, or the grid misses its own.
+    """
+    delays = (process.delay + round(each * rows.cycle) for each in (0.0, 0.1, 0.2))
+    shapes = np.stack([respond(rows.output, rows.coarse, process.lag, each) for each in delays])
+    cost, weights = cost_of(shapes, rows.pv)
+    return cost if weights.sum() * action >= 0.0 else np.inf
+
+
+def _of_curve(rows: Rows, process: Process, action: int) -> float:
+    """Return the cost of a characteristic that rises, or falls, throughout."""
+    output = rows.output
+    shapes = np.stack([respond(output**each, rows.coarse, process.lag, process.delay) for each in (1, 2, 3)])
+    cost, weights = cost_of(shapes, rows.pv)
+    span = np.linspace(float(output.min()), float(output.max()), 50)
+    slope = weights[0] + 2.0 * weights[1] * span + 3.0 * weights[2] * span**2
+    return cost if (slope * (action or np.sign(slope.mean())) >= 0.0).all() else np.inf
 
 
 @dataclass(frozen=True, slots=True)
@@ -173,14 +224,10 @@ class FittedPath:
 def fitted_path(record: LoopRecord, oscillation: Oscillation, friction: Friction) -> FittedPath:
     """Return what friction makes of a record's output."""
     rows = rows_of(record, oscillation)
-    pct, every = rows.output_pct, rows.scale.coarse
-    stem = rest_positions(
-        rows.output,
-        np.array([friction.stiction_pct / pct]),
-        np.array([friction.slip_jump_pct / pct]),
-        np.array([friction.slides_on]),
-    )[:, 0]
-    told = respond(stem, rows.scale, friction.response.lag, friction.response.delay)
+    pct, every = rows.output_pct, rows.coarse
+    size, jump = friction.stiction_pct / pct, friction.slip_jump_pct / pct
+    stem = rest_positions(rows.output, size, jump, friction.slides_on)
+    told = respond(stem, every, friction.process.lag, friction.process.delay)
     weights = np.polyfit(told, rows.pv, 1)
     time_s = np.asarray(rows.period_s * every * (np.arange(rows.pv.size) + 0.5), np.float64)
     middle = float(record.op_pct.mean())
@@ -193,89 +240,51 @@ def fitted_path(record: LoopRecord, oscillation: Oscillation, friction: Friction
     )
 
 
-def _paths(output: Array, scale: Scale, response: Response) -> Array:
-    """Return the response to the output, (n, 3), and the same a tenth and a fifth of a cycle later.
-
-    Their sum has any phase: no stem is preferred because a process has two lags, or the grid misses its own.
-    """
-    delays = [response.delay + each * scale.cycle for each in (0.0, 0.1, 0.2)]
-    return np.stack([respond(output, scale, response.lag, each) for each in delays], axis=1)
-
-
-@dataclass(frozen=True, slots=True)
-class _Trials:
-    """Stems that were tried, g of them: S and J in the unit of the rows, the manner, and the response."""
-
-    stiction: Array
-    ratio: Array
-    slides_on: npt.NDArray[np.bool_]
-    responses: list[Response]
-
-    @property
-    def costs(self) -> Array:
-        return np.array([each.cost for each in self.responses])
-
-
-def _friction(rows: Rows, action: int) -> Friction | None:
-    span = float(np.ptp(rows.output))
-    sizes, ratios, manners = (
-        each.ravel() for each in np.meshgrid(span * np.array(SHARES), JUMPS, [False, True], indexing="ij")
-    )
-    trials = _try(rows, sizes, ratios, manners, action, None)
-    tried, best = [trials], []
+def _refined(rows: Rows, trials: _Trials, action: int) -> Friction:
+    """Return the best stem, sought ever nearer from the best of each manner."""
+    span, tried, best = float(np.ptp(rows.output)), [trials], []
     for manner in (False, True):
-        of_manner = np.where(trials.slides_on == manner, trials.costs, np.inf)
-        at = int(np.argmin(of_manner))
-        if np.isfinite(of_manner[at]):
-            best.append((manner, *_refined(rows, trials, at, span, action, tried)))
-    if not best:
-        return None
-    manner, size, ratio, response = min(best, key=lambda each: each[3].cost)
-    low, high = _interval(
-        np.concatenate([each.stiction for each in tried]), np.concatenate([each.costs for each in tried]), size
-    )
-    pct = rows.output_pct
-    return Friction(size * pct, low * pct, high * pct, size * ratio * pct, manner, min(1.0, size / span), response)
-
-
-def _refined(
-    rows: Rows, trials: _Trials, at: int, span: float, action: int, tried: list[_Trials]
-) -> tuple[float, float, Response]:
-    """Return S, J of S and the response of the best stem about one; adds to those that were tried."""
-    size, ratio, response = float(trials.stiction[at]), float(trials.ratio[at]), trials.responses[at]
-    for step, jump_step in NEARER:
-        sizes, ratios = (
-            each.ravel()
-            for each in np.meshgrid(
-                np.minimum(size * np.exp(step * np.array(ABOUT)), 0.98 * span),
-                np.unique(np.clip(ratio + jump_step * np.array(ABOUT[1:-1]), 0.0, 1.0)),
-                indexing="ij",
+        at, process = trials.best(trials.slides_on == manner)
+        size, jump = float(trials.stiction[at]), float(trials.slip_jump[at])
+        for step, jump_step in NEARER:
+            sizes, ratios = (
+                each.ravel()
+                for each in np.meshgrid(
+                    np.minimum(size * np.exp(step * np.array(ABOUT)), 0.98 * span),
+                    np.unique(np.clip(jump / size + jump_step * np.array(ABOUT[1:-1]), 0.0, 1.0)),
+                    indexing="ij",
+                )
             )
-        )
-        manners = np.full(sizes.size, bool(trials.slides_on[at]))
-        near = _try(rows, sizes, ratios, manners, action, response)
-        tried.append(near)
-        best = int(np.argmin(near.costs))
-        if near.costs[best] < response.cost:
-            size, ratio, response = float(sizes[best]), float(ratios[best]), near.responses[best]
-    return size, ratio, response
+            near = _try(rows, sizes, sizes * ratios, np.full(sizes.size, manner), action, process)
+            tried.append(near)
+            at, found = near.best()
+            if found.cost < process.cost:
+                size, jump, process = float(near.stiction[at]), float(near.slip_jump[at]), found
+        best.append((process.cost, size, jump, manner, process))
+    _, size, jump, manner, process = min(best, key=lambda each: each[0])
+    sizes, costs = (
+        np.concatenate(each) for each in zip(*((t.stiction, t.costs.min(axis=(1, 2))) for t in tried), strict=True)
+    )
+    inside = sizes[costs < process.cost + LIMITS.interval_cost]
+    factor, pct = float(np.exp(LIMITS.least_interval)), rows.output_pct
+    low, high = min(float(inside.min()), size / factor), max(float(inside.max()), size * factor)
+    return Friction(size * pct, low * pct, high * pct, jump * pct, manner, process)
 
 
 def _try(
-    rows: Rows, sizes: Array, ratios: Array, manners: npt.NDArray[np.bool_], action: int, about: Response | None
+    rows: Rows,
+    sizes: Array,
+    jumps: Array,
+    manners: npt.NDArray[np.bool_],
+    action: int,
+    about: Process | None = None,
 ) -> _Trials:
-    """Return stems with their responses; lag and delay of all that may be, or about those of a response."""
-    stems = rest_positions(rows.output, sizes, sizes * ratios, manners)
-    stems[:, stems.std(axis=0) < LEAST_MOTION] = 0.0
+    """Return stems with lag and delay of all that may be, or about those of a process."""
     if about is None:
-        responses = fit_responses(stems, rows.pv, rows.scale, action)
+        lags, delays = rows.cycle * np.array(LAGS), np.round(rows.cycle * np.array(DELAYS))
     else:
-        responses = refine_responses(stems, rows.pv, rows.scale, action, about)
-    return _Trials(sizes, ratios, manners, responses)
-
-
-def _interval(sizes: Array, costs: Array, best: float) -> tuple[float, float]:
-    """Return between which sizes the likelihood is near its best, and no less than the calibrated factor about it."""
-    inside = sizes[costs < costs.min() + LIMITS.interval_cost]
-    factor = float(np.exp(LIMITS.least_interval))
-    return min(float(inside.min()), best / factor), max(float(inside.max()), best * factor)
+        lags = about.lag * np.array(LONGER) if about.lag else np.array([0.0, 0.02 * rows.cycle])
+        delays = np.round(about.delay + rows.cycle * np.array(LATER))
+    delays = np.unique(np.maximum(delays, 0.0)).astype(np.int64)
+    costs, gains = costs_of_stems(rows.output, rows.pv, rows.coarse, sizes, jumps, manners, lags, delays, action)
+    return _Trials(sizes, jumps, manners, lags, delays, costs, gains)

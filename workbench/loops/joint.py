@@ -1,9 +1,8 @@
-"""Several records of one valve taken together: log-likelihoods of independent records add.
+"""Several records of one valve taken together, by the mean of their evidence.
 
-    E = sum of E_i,    q = E / sum of what friction explains in each
-
-One record with a set-point step tells more than ten at rest; which it was need not be known beforehand. S is the median
-of the records, each weighted by its evidence; its interval holds 95 % of that weight, and no less than one record's.
+One record with a set-point step tells more than ten at rest; which it was need not be known beforehand. The evidence
+does not add: what the model of the process has wrong is the same in each record. S is the median of the records, each
+weighted by its evidence; its interval holds 95 % of that weight, and no less than one record's.
 """
 
 from collections.abc import Sequence
@@ -11,7 +10,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from workbench.loops.calibration import CALIBRATION
+from workbench.loops.calibration import CALIBRATION, mean_evidence
 from workbench.loops.loop_diagnosis import LoopDiagnosis
 from workbench.loops.thresholds import LIMITS
 
@@ -49,14 +48,12 @@ class Joint:
 
 def together(found: Sequence[LoopDiagnosis]) -> Joint:
     """Return what records of one valve say together."""
-    causes = [each.causes for each in found if each.causes is not None and each.causes.friction is not None]
+    told = [(each.causes.friction.stiction_pct, each.evidence) for each in found if each.causes]
     name = found[0].record.name
-    if not causes:
+    if not told:
         return Joint(name, 0, None, None)
-    evidence = sum(each.evidence for each in causes)
-    explained = sum(each.explained for each in causes)
-    share = min(1.0, max(0.0, evidence) / max(explained, 1e-12))
-    sized = [(each.friction.stiction_pct, each.evidence) for each in causes if each.friction and each.evidence > 0.0]
+    evidence = mean_evidence([each for _, each in told])
+    sized = [(stiction_pct, each.nats) for stiction_pct, each in told if each.nats > 0.0]
     size = None
     if sized:
         sizes, weights = np.array(sorted(sized)).T
@@ -64,4 +61,4 @@ def together(found: Sequence[LoopDiagnosis]) -> Joint:
         low, middle, high = (float(sizes[int(np.searchsorted(place, at))]) for at in (0.025, 0.5, 0.975))
         factor = float(np.exp(LIMITS.least_interval))
         size = (middle, min(low, middle / factor), max(high, middle * factor))
-    return Joint(name, len(causes), CALIBRATION.probability(evidence, share), size)
+    return Joint(name, len(told), CALIBRATION.probability(evidence), size)

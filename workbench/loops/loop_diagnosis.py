@@ -9,14 +9,14 @@ import numpy as np
 from config.extras import needed
 from config.results.block import Block, Table
 from config.results.result import Result
-from workbench.loops.calibration import CALIBRATION
+from workbench.loops.calibration import CALIBRATION, Evidence
 from workbench.loops.causes import Causes, fitted_path, hold_causes
 from workbench.loops.controller_law import ControllerLaw, see_law
 from workbench.loops.loop_record import LoopRecord
 from workbench.loops.oscillation import Oscillation, find_oscillation
 from workbench.loops.quality_gates import Gate, closed_gates
 from workbench.loops.remedies import Remedy, find_remedies
-from workbench.loops.shape_methods import Vote, votes
+from workbench.loops.shape_methods import Vote, out_of_phase, votes
 from workbench.loops.thresholds import LIMITS
 
 if TYPE_CHECKING:
@@ -33,6 +33,7 @@ class LoopDiagnosis(Result):
         record: of the loop.
         verdict: one of three.
         cause: what it is, where the valve does not stick; "" where nothing is named.
+        evidence: for friction; of an insufficient record there is none but OP's and PV's phase.
         probability: that the valve sticks; None where the record is insufficient.
         oscillation, setpoint: of OP, which has PV's period and less noise, and of SP; None where SP stands.
         law: the controller's.
@@ -45,6 +46,7 @@ class LoopDiagnosis(Result):
     record: LoopRecord
     verdict: Verdict
     cause: str
+    evidence: Evidence
     probability: float | None
     oscillation: Oscillation
     setpoint: Oscillation | None
@@ -65,7 +67,6 @@ class LoopDiagnosis(Result):
         """The whole in one line."""
         if self.verdict == "sticks":
             assert self.causes is not None
-            assert self.causes.friction is not None
             assert self.probability is not None
             each = self.causes.friction
             return (
@@ -138,7 +139,8 @@ class LoopDiagnosis(Result):
             "stiction_pct": friction.stiction_pct if friction else None,
             "stiction_pct_95": [friction.low_pct, friction.high_pct] if friction else None,
             "slip_jump_pct": friction.slip_jump_pct if friction else None,
-            "evidence_nats": self.causes.evidence if self.causes else None,
+            "evidence_nats": self.evidence.nats,
+            "out_of_phase": self.evidence.out_of_phase,
             "costs_nats": self.causes.costs if self.causes else {},
             "period_s": self.oscillation.period_s,
             "regularity": self.oscillation.regularity,
@@ -185,24 +187,27 @@ def diagnose_loop(record: LoopRecord) -> LoopDiagnosis:
         setpoint = find_oscillation(record.sp, record.period_s)
     gates = closed_gates(record, oscillation)
     said = votes(record, oscillation) if np.ptp(record.op_pct) > 0.0 else ()
+    phase = out_of_phase(record)
     if gates:
-        return LoopDiagnosis(record, "cannot be told", "", None, oscillation, setpoint, law, gates, None, said)
+        none = Evidence(0.0, 0.0, phase)
+        return LoopDiagnosis(record, "cannot be told", "", none, None, oscillation, setpoint, law, gates, None, said)
     causes = hold_causes(record, oscillation, law.action)
-    probability = CALIBRATION.probability(causes.evidence, causes.share)
+    evidence = Evidence(causes.evidence, causes.explained, phase)
+    probability = CALIBRATION.probability(evidence)
     verdict: Verdict = "cannot be told"
     cause = ""
-    if probability >= LIMITS.sticks_probability and causes.friction:
+    if probability >= LIMITS.sticks_probability:
         verdict = "sticks"
     elif probability <= LIMITS.other_probability:
         verdict, cause = "something else", _other(oscillation, setpoint, causes)
     treatable = verdict == "sticks" and law.seen and np.isfinite(law.reset_s)
     remedies = _remedies(record, oscillation, law, causes) if treatable else ()
-    return LoopDiagnosis(record, verdict, cause, probability, oscillation, setpoint, law, gates, causes, said, remedies)
+    return LoopDiagnosis(
+        record, verdict, cause, evidence, probability, oscillation, setpoint, law, gates, causes, said, remedies
+    )
 
 
 def _remedies(record: LoopRecord, oscillation: Oscillation, law: ControllerLaw, causes: Causes) -> tuple[Remedy, ...]:
-    if causes.friction is None:
-        return ()
     error = record.pv - (record.pv.mean() if record.sp is None else record.sp)
     path = fitted_path(record, oscillation, causes.friction)
     noise = float(np.diff(path.pv - path.pv_fitted).std() / np.sqrt(2.0))

@@ -96,6 +96,12 @@ class LoopRecord(Brief):
         return self.period_s * (self.pv.size - 1)
 
 
+def averaged(values: Array, every: int) -> Array:
+    """Return means of each `every` rows of (n,)."""
+    count = values.size // every
+    return np.asarray(values[: count * every].reshape(count, every).mean(axis=1))
+
+
 def _held(values: Array) -> Array:
     """Return values, (n,), with the last one known where there is none: a set point stays until it is written."""
     known = np.isfinite(values)

@@ -52,6 +52,12 @@ def _of_samples(record: LoopRecord, oscillation: Oscillation) -> Iterator[Gate]:
     elif oscillation.regular and oscillation.cycles < LIMITS.fewest_cycles:
         longer_s = 2.0 * LIMITS.fewest_cycles * oscillation.period_s
         yield Gate("short", f"{oscillation.cycles:.1f} cycles are too few", f"{longer_s:.0f} s or more")
+    if np.ptp(record.op_pct) > 0.0 and (turned := turns(record.op_pct)) < LIMITS.fewest_turns:
+        yield Gate(
+            "one way",
+            f"the output turns {turned} times: stiction shows when it turns",
+            "longer, over a few of its turns",
+        )
     a_cycle = oscillation.period_s / record.period_s
     if a_cycle < LIMITS.fewest_a_cycle:
         yield Gate(
@@ -77,6 +83,20 @@ def _of_storage(record: LoopRecord) -> Iterator[Gate]:
             )
         if (levels := np.unique(values).size) < LIMITS.fewest_levels:
             yield Gate("rounded", f"the {name} has {levels} values in all", f"the {name} with two more digits")
+
+
+def turns(values: Array) -> int:
+    """Return how often a signal, (n,), comes back by `LIMITS.turn_share` of its span."""
+    back = LIMITS.turn_share * float(np.ptp(values))
+    count, way = 0, 0
+    low = high = float(values[0])
+    for value in values.tolist():
+        low, high = min(low, value), max(high, value)
+        if way >= 0 and value < high - back:
+            count, way, low, high = count + (way > 0), -1, value, value
+        elif way <= 0 and value > low + back:
+            count, way, low, high = count + (way < 0), 1, value, value
+    return count
 
 
 def straight_share(values: Array) -> float:

@@ -25,8 +25,6 @@ KNOCK_EVERY, KNOCK_FOR = 6, 2
 """Samples; Hägglund: a period of 2 to 5 times the width, a width of 1 to 2 samples."""
 LIMIT_PCT = 50.0
 """Of the output about where it works."""
-KICK = 2.0
-"""Of f_s, where the integral part begins: a loop that begins at rest would stay there."""
 CREDIBLE = 2.0
 """Factor within which the simulated error's size must be the record's."""
 
@@ -90,7 +88,7 @@ def find_remedies(
         0.5 * (size - jump),
         gain,
         float(np.exp(-period_s / max(lag_s, 1e-6 * period_s))),
-        round(delay_s / period_s),
+        max(1, round(delay_s / period_s)),
         noise,
     )
     detuned = replace(loop, gain=0.5 * loop.gain, integral=0.5 * loop.integral)
@@ -141,8 +139,9 @@ def _simulated(loop: _Loop, policy: _Policy) -> tuple[float, float]:
     """Return the rms of the error and the stem's travel a sample, %, of a simulated loop."""
     rng = np.random.default_rng(0)
     shocks = (loop.noise * rng.standard_normal(SAMPLES)).tolist()
-    line = [0.0] * (loop.delay + 1)
-    stem, pv, integral, before = 0.0, 0.0, KICK * loop.breaks, 0.0
+    # Half a slip from where it belongs: a stem that begins there, or a whole slip away, may rest there by chance.
+    stem = integral = before = 0.5 * (loop.breaks - loop.slides)
+    pv, line = loop.process_gain * stem, [stem] * (loop.delay - 1)
     held, wait = 0.0, 0
     errors, stems = np.empty(SAMPLES), np.empty(SAMPLES)
     settles = 4 * (loop.delay + 1) + round(4.0 / max(1e-3, 1.0 - loop.pole))

@@ -14,9 +14,8 @@ from itertools import pairwise
 
 import numpy as np
 
-from workbench.loops.loop_record import Array, LoopRecord
+from workbench.loops.loop_record import Array, LoopRecord, averaged
 from workbench.loops.oscillation import Oscillation, without_trend
-from workbench.loops.process_response import averaged
 
 FEWEST_HALVES = 4
 """Half cycles, below which a shape is chance."""
@@ -84,6 +83,17 @@ def horch(op: Array, pv: Array, cycle: float) -> Vote:
     least, at_zero = float(np.abs(correlation).max()), abs(float(correlation[reach]))
     index = abs(at_zero - least) / max(at_zero + least, 1e-300)
     return Vote("Horch", index, "sticks" if index > HORCH_ODD else "no" if index < HORCH_EVEN else "open")
+
+
+def out_of_phase(record: LoopRecord) -> float:
+    """Return one less OP's and PV's correlation at lag zero, 0 to 1: Horch's index without its other lags.
+
+    0: OP is proportional to PV, or PV follows OP at once, and no rest of the stem parts them.
+    """
+    window = np.hanning(record.pv.size)
+    first, second = (window * without_trend(each) for each in (record.op_pct, record.pv))
+    first, second = first - first.mean(), second - second.mean()
+    return 1.0 - abs(float(first @ second)) / max(float(np.sqrt((first @ first) * (second @ second))), 1e-300)
 
 
 def kano(op: Array, pv: Array, cycle: float) -> Vote:

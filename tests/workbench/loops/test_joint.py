@@ -4,6 +4,7 @@ import pytest
 
 from benchmarks.drawn_loops import draw_loop
 from workbench.loops import LoopDiagnosis, LoopRecord, diagnose_loop
+from workbench.loops.calibration import Evidence
 from workbench.loops.joint import together
 
 
@@ -15,24 +16,26 @@ def sticking() -> LoopDiagnosis:
 
 def of_evidence(each: LoopDiagnosis, nats: float) -> LoopDiagnosis:
     """Return the same with this evidence, of 50 nats that friction explains."""
-    assert each.causes is not None
-    costs = {"friction": 0.0, "linear": nats, "nonlinear": 90.0, "disturbance": 50.0}
-    return replace(each, causes=replace(each.causes, costs=costs))
+    return replace(each, evidence=Evidence(nats, 50.0, 0.5))
 
 
-def test_records_that_leave_it_open_each_tell_together(sticking: LoopDiagnosis) -> None:
-    one = of_evidence(sticking, 25.0)
-    alone, all_of_them = together([one]), together([one] * 8)
+def test_a_record_that_tells_is_heard_among_others_that_do_not(sticking: LoopDiagnosis) -> None:
+    open_ones, telling = [of_evidence(sticking, 0.0)] * 3, of_evidence(sticking, 200.0)
+    alone, all_of_them = together(open_ones), together([*open_ones, telling])
     assert alone.probability is not None
     assert all_of_them.probability is not None
-    assert alone.probability < all_of_them.probability
+    assert alone.probability < 0.5 < all_of_them.probability
     assert all_of_them.stiction_pct is not None
     assert all_of_them.stiction_pct[1] < 5.8 < all_of_them.stiction_pct[2]
 
 
+def test_the_same_record_again_tells_no_more(sticking: LoopDiagnosis) -> None:
+    assert together([sticking] * 5).probability == pytest.approx(sticking.probability)
+
+
 def test_evidence_against_friction_counts_as_well(sticking: LoopDiagnosis) -> None:
     found = together([of_evidence(sticking, 25.0), of_evidence(sticking, -40.0)])
-    assert found.probability == together([of_evidence(sticking, -1.0)]).probability
+    assert found.probability == pytest.approx(together([of_evidence(sticking, -7.5)]).probability)
 
 
 def test_what_is_insufficient_is_left_out(sticking: LoopDiagnosis) -> None:
