@@ -140,23 +140,21 @@ Key = tuple[str, str, int]
 """Set, loop, label."""
 
 
-def labelled(folder: Path) -> Iterator[tuple[Key, dict[str, str], Array]]:
+def labelled(folder: Path) -> Iterator[tuple[Key, dict[str, str], dict[str, Array]]]:
     """Yield key, line and columns of each record with a label."""
     with (folder / "labels.csv").open(encoding="utf-8") as file:
         rows = [row for row in csv.DictReader(file) if row["sticks"] in ("0", "1")]
     for row in rows:
-        yield (
-            (row["set"], row["loop"], int(row["sticks"])),
-            row,
-            np.genfromtxt(folder / row["file"], delimiter=",", names=True),
-        )
+        columns = np.genfromtxt(folder / row["file"], delimiter=",", names=True)
+        named = {name: columns[name] for name in columns.dtype.names or ()}
+        yield (row["set"], row["loop"], int(row["sticks"])), row, named
 
 
 def diagnosed(folder: Path) -> dict[Key, list[LoopDiagnosis]]:
     """Return the diagnoses of each labelled loop's records."""
     found: dict[Key, list[LoopDiagnosis]] = defaultdict(list)
     for key, _, columns in labelled(folder):
-        if "pv" in (columns.dtype.names or ()):
+        if "pv" in columns:
             samples = (columns[name] for name in ("time_s", "op_pct", "pv", "sp"))
             found[key].append(diagnose_loop(LoopRecord.of_samples(key[1], *samples)))
     return found
@@ -169,7 +167,7 @@ def of_labelled(folder: Path) -> list[Score]:
     """
     windows: dict[Key, list[dict[str, float]]] = defaultdict(list)
     for key, row, columns in labelled(folder):
-        if "pv" not in (columns.dtype.names or ()):
+        if "pv" not in columns:
             period_s = float(np.median(np.diff(columns["time_s"])))
             found = find_oscillation(columns["op"], period_s)
             windows[key].append({"He": he(columns["op"], found.period_s / period_s).index})
@@ -247,8 +245,8 @@ def of_pairs(told: Sequence[Evidence], truth: Array, weights: Array, first: int)
     wins = []
     for ours, other in product(*(first + np.flatnonzero(truth[first:] == which) for which in (1.0, 0.0))):
         kept = np.setdiff1d(np.arange(truth.size), (ours, other))
-        fitted = calibrate([told[at] for at in kept], truth[kept], weights[kept])
-        a, b = fitted.probability(told[ours]), fitted.probability(told[other])
+        fitted = calibrate([told[at] for at in kept.tolist()], truth[kept], weights[kept])
+        a, b = fitted.probability(told[int(ours)]), fitted.probability(told[int(other)])
         wins.append((a > b) + 0.5 * (a == b))
     return float(np.mean(wins))
 

@@ -285,6 +285,6 @@ def _try(
     else:
         lags = about.lag * np.array(LONGER) if about.lag else np.array([0.0, 0.02 * rows.cycle])
         delays = np.round(about.delay + rows.cycle * np.array(LATER))
-    delays = np.unique(np.maximum(delays, 0.0)).astype(np.int64)
-    costs, gains = costs_of_stems(rows.output, rows.pv, rows.coarse, sizes, jumps, manners, lags, delays, action)
-    return _Trials(sizes, jumps, manners, lags, delays, costs, gains)
+    whole = np.unique(np.maximum(delays, 0.0)).astype(np.int64)
+    costs, gains = costs_of_stems(rows.output, rows.pv, rows.coarse, sizes, jumps, manners, lags, whole, action)
+    return _Trials(sizes, jumps, manners, lags, whole, costs, gains)
