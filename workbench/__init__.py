@@ -16,5 +16,6 @@ Its functions are names of the library, `import positioner` (docs/library.md). I
     report         all of it for a browser
     fleet          many valves at once
     loops          control loops without a stem signal
+    bench          an open benchmark of it
     page           all of it in a browser, while it is worked
 """

@@ -4,7 +4,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from benchmarks.drawn_loops import draw_loop
+from workbench.bench.drawn_loops import draw_loop
 from positioner.cli.main import main
 
 LOOP = draw_loop(10, "sticks")

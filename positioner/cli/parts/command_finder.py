@@ -53,6 +53,7 @@ COMMANDS = {
     "fleet": "fleet",
     "loop": "sim,plot",
     "loops": "sim,plot",
+    "bench": "sim,plot",
     "reproduce": "sim,plot",
     "hide": "sim,plot",
     "certify": "",

@@ -2,7 +2,7 @@ from dataclasses import replace
 
 import pytest
 
-from benchmarks.drawn_loops import draw_loop
+from workbench.bench.drawn_loops import draw_loop
 from workbench.loops import LoopDiagnosis, LoopRecord, diagnose_loop
 from workbench.loops.calibration import Evidence
 from workbench.loops.joint import together

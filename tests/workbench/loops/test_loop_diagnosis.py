@@ -1,11 +1,11 @@
-"""Drawn loops with truth, by equations that are not the product's (`benchmarks.drawn_loops`)."""
+"""Drawn loops with truth, by equations that are not the product's (`workbench.bench.drawn_loops`)."""
 
 from dataclasses import replace
 
 import numpy as np
 import pytest
 
-from benchmarks.drawn_loops import DrawnLoop, draw_loop
+from workbench.bench.drawn_loops import DrawnLoop, draw_loop
 from workbench.loops import LoopDiagnosis, LoopRecord, diagnose_loop
 
 

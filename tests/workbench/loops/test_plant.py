@@ -3,7 +3,7 @@ from pathlib import Path
 
 import pytest
 
-from benchmarks.drawn_loops import draw_loop
+from workbench.bench.drawn_loops import draw_loop
 from config.errors import InputError
 from workbench.loops import LoopDiagnosis, LoopRecord, diagnose_loop
 from workbench.loops.loop_report import report_loop, report_loops

@@ -1,6 +1,6 @@
-"""Control loops drawn at random, with truth: what `benchmarks.loops` and the tests of the loops are held against.
+"""Control loops drawn at random, with truth: what the benchmark and the tests of the loops are held against.
 
-Nothing here is the product's: the stems are the literature's data-driven models, written from their papers, and one of
+Nothing here is what diagnoses: the stems are the literature's data-driven models, written from their papers, and one of
 forces; the processes are stepped ten times a sample.
 
     SP ---(-)--> PI ---OP---> stem ---x---> f(x) ---> process, dead time ---(+)---> PV

@@ -1,0 +1,54 @@
+"""`positioner bench`: the open benchmark."""
+
+import argparse
+import sys
+from pathlib import Path
+
+HELP = (
+    "run the open benchmark: loops and hidden effects with truth, ours and the literature's methods, one results file"
+)
+EXAMPLE = "positioner bench cases --drawn 300"
+RESULTS = "results.csv"
+
+
+def add_arguments(parser: argparse.ArgumentParser) -> None:
+    """Declare the command line."""
+    parser.add_argument("folder", type=Path, metavar="DIR", help="of the cases: written where it holds none")
+    parser.add_argument("--drawn", type=int, default=300, metavar="N", help="loops drawn with truth (300)")
+    parser.add_argument("--effects", type=int, default=0, metavar="N", help="hidden effects, half a minute each (0)")
+    parser.add_argument("--first-seed", type=int, default=4000, metavar="SEED", help="of those that are drawn (4000)")
+    parser.add_argument("--labelled", type=Path, metavar="DIR", help="loops of others: labels.csv and their files")
+    parser.add_argument("--judge", type=Path, nargs="+", default=[], metavar="FILE", help="results of other methods")
+    parser.add_argument("--workers", type=int, metavar="N", help="processes (one a core)")
+
+
+def run(arguments: argparse.Namespace) -> int:
+    """Write the cases, answer them where that is not done, and print the scores; 0."""
+    from concurrent.futures import ProcessPoolExecutor
+
+    from config.errors import InputError
+    from workbench.bench.cases import CASES, read_cases, write_cases
+    from workbench.bench.methods import answers_of
+    from workbench.bench.scores import Answer, read_results, tell_scores, write_results
+
+    for name in ("drawn", "effects", "first_seed"):
+        if (value := getattr(arguments, name)) < 0:
+            raise InputError(f"--{name.replace('_', '-')}", f"must be 0 or more, got {value}")
+    folder = arguments.folder
+    if not (folder / CASES).exists():
+        write_cases(folder, arguments.drawn, arguments.effects, arguments.first_seed, arguments.labelled)
+    cases = read_cases(folder)
+    answers: list[Answer] = []
+    if (folder / RESULTS).exists():
+        answers = read_results(folder / RESULTS)
+    else:
+        with ProcessPoolExecutor(arguments.workers) as pool:
+            for count, found in enumerate(pool.map(answers_of, cases), start=1):
+                answers += found
+                print(f"\r{count} of {len(cases)} cases", end="", file=sys.stderr, flush=True)
+        print(file=sys.stderr)
+        write_results(folder / RESULTS, answers)
+    for path in arguments.judge:
+        answers += read_results(path)
+    print(*tell_scores(cases, answers), sep="\n")
+    return 0
