@@ -4,8 +4,8 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from workbench.bench.drawn_loops import draw_loop
 from positioner.cli.main import main
+from workbench.bench.drawn_loops import draw_loop
 
 LOOP = draw_loop(10, "sticks")
 

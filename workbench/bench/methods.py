@@ -40,9 +40,9 @@ def loop_records(case: Case) -> list[LoopRecord]:
     """Return the records of a case that hold PV."""
     tables = [np.genfromtxt(path, delimiter=",", names=True) for path in case.files]
     return [
-        LoopRecord.of_samples(case.name, *(each[name] for name in ("time_s", "op_pct", "pv", "sp")))
+        LoopRecord.of_samples(case.name, each["time_s"], each["op_pct"], each["pv"], each["sp"])
         for each in tables
-        if "pv" in each.dtype.names
+        if "pv" in (each.dtype.names or ())
     ]
 
 

@@ -3,8 +3,8 @@ from pathlib import Path
 
 import pytest
 
-from workbench.bench.drawn_loops import draw_loop
 from config.errors import InputError
+from workbench.bench.drawn_loops import draw_loop
 from workbench.loops import LoopDiagnosis, LoopRecord, diagnose_loop
 from workbench.loops.loop_report import report_loop, report_loops
 from workbench.loops.plant import Plant, find_groups, read_manifest
