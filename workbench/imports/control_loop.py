@@ -119,7 +119,7 @@ def _role(column: LoopColumn) -> str | None:
 def _tag(name: str, role: str) -> str:
     """Return what is left of a name without the words for what it is."""
     words = {"setpoint": SETPOINT, "output": OUTPUT, "process_value": PROCESS_VALUE}[role]
-    left = re.sub(rf"(?:{words})\w*|[\[(<].*$", " ", taken_apart(name), flags=re.IGNORECASE)
+    left = re.sub(rf"(?:{words})\w*|\bvalue\b|[\[(<].*$", " ", taken_apart(name), flags=re.IGNORECASE)
     return " ".join(re.sub(r"%|\S+/\S+", " ", left).split())
 
 

@@ -5,7 +5,7 @@ The columns are those that `control_loop` recognises, unless a person names them
 """
 
 import re
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field
 from pathlib import Path
 
@@ -14,13 +14,13 @@ import numpy.typing as npt
 
 from config.errors import InputError
 from workbench.imports.cell_kinds import numbers_of
+from workbench.imports.clock_groups import find_groups
 from workbench.imports.column_clock import clock_of
 from workbench.imports.control_loop import LEAST_SHARE, MOST_SHARE, LoopColumns
 from workbench.imports.export_preview import ExportPreview, preview
 from workbench.imports.file_kind import raw_tables
-from workbench.imports.header_search import find_header
 from workbench.imports.number_notation import decimal_sign
-from workbench.imports.sample_rows import collected
+from workbench.imports.sample_rows import Samples, collected
 from workbench.imports.time_order import in_order
 
 Array = npt.NDArray[np.float64]
@@ -37,13 +37,15 @@ class LoopSamples:
 
     Attributes:
         name: the loop's tag, or the file's name.
-        time_s: from the first sample.
+        begin_s: of the first sample, s since 1970, or by the file's own clock.
+        time_s: from there.
         op_pct, pv, sp: as recorded; sp None where there is none.
         automatic: where the mode is none of manual; None where no mode is on record.
         notes: what was put right.
     """
 
     name: str
+    begin_s: float
     time_s: Array
     op_pct: Array
     pv: Array
@@ -73,22 +75,24 @@ def read_loop(
     """
     roles = dict(named or {})
     loop = None if {"time", "op", "pv"} <= set(roles) else _recognised(path, roles)
-    header = find_header(path, raw_tables(path), list(dict.fromkeys(roles.values())))
-    samples = collected(path, header, roles["time"], lambda _what, _done: None)
-    cells = {role: samples.cells[theirs] for role, theirs in roles.items()}
-    texts = [cell for role in ("op", "pv") for cell in cells[role] if isinstance(cell, str)]
-    decimal = decimal or decimal_sign(str(path), texts, header.table.separator)
-    clock = clock_of(path, samples, roles["time"], None, time_format, decimal)
-    values = [numbers_of(cells[role], decimal) for role in ("op", "pv", "sp") if role in roles]
-    manual = np.array([MANUAL.match(str(each).strip()) is not None for each in cells.get("mode", [])])
-    if manual.size:
-        values.append(manual.astype(np.float64))
-    local_from_s = clock.origin_s if clock.local else None
-    time_s, rows, notes = in_order(
-        path, clock.time_s, values, samples.lines, local_from_s=local_from_s, daily=clock.daily
-    )
+    wanted = [theirs for role, theirs in roles.items() if role != "time"]
+    headers = find_groups(path, raw_tables(path), roles["time"], wanted)
+    parts = [collected(path, header, roles["time"], lambda _what, _done: None) for header in headers]
+    texts = [
+        cell
+        for part in parts
+        for role in ("op", "pv")
+        for cell in part.cells.get(roles[role], ())
+        if isinstance(cell, str)
+    ]
+    decimal = decimal or decimal_sign(str(path), texts, headers[0].table.separator)
+    read = [_of_one_clock(path, part, roles, time_format, decimal) for part in parts]
+    time_s, columns = _laid_on_pv(path, read)
+    notes = {
+        key: said for part, each in zip(parts, read, strict=True) for key, said in (part.notes | each.notes).items()
+    }
     low, high = op_range
-    op_pct = 100.0 * (values[0][rows] - low) / (high - low)
+    op_pct = 100.0 * (columns["op"] - low) / (high - low)
     known = op_pct[np.isfinite(op_pct)]
     if known.size and (known.min() < LEAST_SHARE or known.max() > MOST_SHARE):
         raise InputError(
@@ -99,13 +103,59 @@ def read_loop(
     name = loop.tag if loop is not None and loop.tag else path.stem
     return LoopSamples(
         name,
+        float(time_s[0]),
         time_s - time_s[0],
         op_pct,
-        values[1][rows],
-        values[2][rows] if "sp" in roles else None,
-        ~manual[rows] if manual.size else None,
-        samples.notes | notes,
+        columns["pv"],
+        columns.get("sp"),
+        columns["mode"] == 0.0 if "mode" in columns else None,
+        notes,
     )
+
+
+@dataclass(frozen=True, slots=True)
+class _OneClock:
+    """Columns of one clock, by role, (n,) each, in the order of its time, s; `mode` is 1 in manual."""
+
+    time_s: Array
+    columns: dict[str, Array]
+    notes: Mapping[str, str]
+
+
+def _of_one_clock(
+    path: Path, part: Samples, roles: Mapping[str, str], time_format: str | None, decimal: str
+) -> _OneClock:
+    clock = clock_of(path, part, roles["time"], None, time_format, decimal)
+    values: dict[str, Array] = {}
+    for role, theirs in roles.items():
+        if role == "mode" and theirs in part.cells:
+            values[role] = np.array([float(MANUAL.match(str(each).strip()) is not None) for each in part.cells[theirs]])
+        elif role != "time" and theirs in part.cells:
+            values[role] = numbers_of(part.cells[theirs], decimal)
+    local_from_s = clock.origin_s if clock.local else None
+    time_s, rows, notes = in_order(
+        path, clock.time_s, list(values.values()), part.lines, local_from_s=local_from_s, daily=clock.daily
+    )
+    return _OneClock(time_s + (clock.origin_s or 0.0), {role: column[rows] for role, column in values.items()}, notes)
+
+
+def _laid_on_pv(path: Path, parts: Sequence[_OneClock]) -> tuple[Array, dict[str, Array]]:
+    """Return PV's time and all columns at it: OP on straight lines between its samples, SP and mode as last said.
+
+    Raises:
+        InputError: OP has no time in common with PV.
+    """
+    base = next(each for each in parts if "pv" in each.columns)
+    columns = dict(base.columns)
+    for part in (each for each in parts if each is not base):
+        for role, values in part.columns.items():
+            if role == "op":
+                columns[role] = np.interp(base.time_s, part.time_s, values, np.nan, np.nan)
+            else:
+                columns[role] = values[np.maximum(np.searchsorted(part.time_s, base.time_s, "right") - 1, 0)]
+    if not np.isfinite(columns["op"]).any():
+        raise InputError(str(path), "output and process value have no time in common: export both of one period")
+    return base.time_s, columns
 
 
 def _recognised(path: Path, roles: dict[str, str]) -> LoopColumns | None:

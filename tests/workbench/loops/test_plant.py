@@ -1,13 +1,15 @@
 from dataclasses import replace
 from pathlib import Path
 
+import numpy as np
 import pytest
 
 from config.errors import InputError
 from workbench.bench.drawn_loops import draw_loop
 from workbench.loops import LoopDiagnosis, LoopRecord, diagnose_loop
 from workbench.loops.loop_report import report_loop, report_loops
-from workbench.loops.plant import Plant, find_groups, read_manifest
+from workbench.loops.oscillation import Oscillation
+from workbench.loops.plant import Plant, delay_s, find_groups, read_manifest
 
 
 @pytest.fixture(scope="module")
@@ -35,6 +37,21 @@ def test_loops_of_one_period_are_a_group_and_the_sticking_valve_is_its_source(
     (group,) = find_groups(loops)
     assert group.loops == ("FIC101", "<b>TIC7")
     assert group.source == "FIC101"
+
+
+def test_of_loops_that_swing_together_the_source_is_ahead_of_all_others(swinging: LoopDiagnosis) -> None:
+    at_s = np.arange(0.0, 1000.0, 2.0)
+
+    def late_by(seconds: float, name: str, sign: float = 1.0, begin_s: float = 0.0) -> LoopDiagnosis:
+        pv = 40.0 + sign * np.sin(2.0 * np.pi * (begin_s + at_s - seconds) / 100.0)
+        record = LoopRecord(name, begin_s, 2.0, swinging.record.op_pct[: at_s.size], pv)
+        return replace(swinging, record=record, oscillation=Oscillation(100.0, 5.0, 10.0))
+
+    loops = [late_by(20.0, "A", begin_s=40.0), late_by(8.0, "B"), late_by(15.0, "C", -1.0)]
+    assert delay_s(loops[1].record, loops[0].record, 100.0) == pytest.approx(12.0, abs=2.0)
+    assert delay_s(loops[1].record, late_by(0.0, "D", begin_s=5000.0).record, 100.0) is None
+    (group,) = find_groups(loops)
+    assert (group.source, group.because) == ("B", "its process value is ahead of all others")
 
 
 def test_a_plants_page_has_a_line_a_loop_and_escapes_what_is_not_ours(

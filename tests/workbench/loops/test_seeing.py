@@ -6,6 +6,7 @@ import pytest
 from workbench.loops.controller_law import see_law
 from workbench.loops.loop_record import LoopRecord
 from workbench.loops.oscillation import find_oscillation
+from workbench.loops.quality_gates import turns
 from workbench.loops.shape_methods import hagglund, he, horch, out_of_phase
 
 TIME = np.arange(1000.0)
@@ -50,3 +51,9 @@ def test_out_of_phase_are_a_quarter_of_a_cycle_and_not_proportional_action() -> 
 
     assert of(-3.0 * SINE) == pytest.approx(0.0, abs=1e-9)
     assert of(np.sin(2.0 * np.pi * (TIME - 10.0) / 40.0)) == pytest.approx(1.0, abs=0.02)
+
+
+def test_turns_are_counted_that_come_back_by_a_quarter() -> None:
+    assert turns(np.linspace(0.0, 10.0, 50)) == 0
+    assert turns(np.array([0.0, 10.0, 8.0, 9.0, 2.0, 3.0, 10.0])) == 2
+    assert turns(SINE) == 50
