@@ -119,7 +119,7 @@ class _OneClock:
 
     time_s: Array
     columns: dict[str, Array]
-    notes: Mapping[str, str]
+    notes: dict[str, str]
 
 
 def _of_one_clock(

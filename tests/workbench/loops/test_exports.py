@@ -2,6 +2,7 @@
 
 import json
 import re
+from collections.abc import Callable
 from datetime import datetime, timedelta
 from pathlib import Path
 
@@ -42,8 +43,8 @@ def row_a_value(path: Path) -> None:
 @needs_data
 @pytest.mark.parametrize("write", [pairs, row_a_value])
 def test_a_refinerys_loop_goes_from_another_programs_export_to_its_verdict(
-    write, tmp_path: Path, capsys: pytest.CaptureFixture[str]
-) -> None:  # type: ignore[no-untyped-def]
+    write: Callable[[Path], None], tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
     export, found = tmp_path / "export.csv", tmp_path / "found.json"
     write(export)
     words = ["loop", str(export), "--json", str(found)]
