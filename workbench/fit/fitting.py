@@ -211,25 +211,22 @@ def begun_trial(
     else:
         near = near_start(like, added, fitted, points)
         searches.append(lambda: ended(like, near, base.onsets_s, coarsely=True))
-    ends = on_threads(lambda search: search(), searches, workers)
+    ends = list(on_threads(lambda search: search(), searches, workers))
+    best = min(ends, key=lambda each: each.cost)
+    other_order = exchanged(like, best.z)
+    if other_order is not None and not at_the_noise(like, best.cost):
+        onsets_s, _ = with_onsets(like, like.theta(other_order), COARSE_ROUNDS)
+        ends.append(ended(like, other_order, onsets_s, coarsely=True))
     return Trial(like, tuple(sorted(ends, key=lambda each: each.cost)))
 
 
 @linear_algebra_alone()
 def finished(of: Problem, trial: Trial) -> Fit:
-    """Search to the end from the best valley of a trial; if that leaves something, from others.
-
-    These are the next best, and the best with its lags in the other order.
-    """
+    """Search to the end from the best valley of a trial, and from the next best if that leaves something."""
     like, (first, *others) = trial.like, trial.valleys
     ends = [_settled(like, ended(like, first.z, first.onsets_s))]
-    if not at_the_noise(like, ends[0].cost):
-        if others and others[0].cost < NEAR * first.cost:
-            ends.append(_settled(like, ended(like, others[0].z, others[0].onsets_s)))
-        other_order = exchanged(like, min(ends, key=lambda each: each.cost).z)
-        if other_order is not None:
-            onsets_s, _ = with_onsets(like, like.theta(other_order))
-            ends.append(ended(like, other_order, onsets_s))
+    if not at_the_noise(like, ends[0].cost) and others and others[0].cost < NEAR * first.cost:
+        ends.append(_settled(like, ended(like, others[0].z, others[0].onsets_s)))
     return _best(of, like, ends)
 
 
