@@ -25,7 +25,7 @@ from typing import Any
 
 import numpy as np
 
-from benchmarks.blind import FOLDER, KEPT
+from benchmarks.blind import KEPT
 from benchmarks.kept_lines import Line, keep, kept
 from config.recording import Recording
 from config.slave_file import Sensor
@@ -154,7 +154,7 @@ def _kept(found: Discrimination, hidden: str) -> dict[str, Any]:
 def cases(families: Sequence[str], seeds: Sequence[int] | None) -> list[Line]:
     """Return the kept blind cases that ended in one set of more than one class, the hidden effect visible."""
     library = {name: shipped_effect(name, "library") for name in shipped_effects()}
-    lines = [*kept(FOLDER / KEPT), *kept(FOLDER / "before" / KEPT)]
+    lines = kept(KEPT)
     return [
         each
         for each in lines

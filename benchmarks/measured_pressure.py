@@ -18,7 +18,7 @@ from collections import Counter
 from collections.abc import Iterator, Sequence
 from pathlib import Path
 
-from benchmarks.blind import FOLDER, KEPT
+from benchmarks.blind import KEPT
 from benchmarks.kept_lines import Line, keep, kept
 from sim.effect import shipped_effect, tried_effects
 from workbench.blind.hiding import hide
@@ -33,7 +33,7 @@ def cases(family: str, seeds: Sequence[int] | None) -> list[Line]:
     library = {name: shipped_effect(name, "library") for name in tried_effects()}
     return [
         each
-        for each in kept(FOLDER / KEPT)
+        for each in kept(KEPT)
         if each["family"] == family
         and each["setting"] == "dirty"
         and (each["visible"] or not each["hidden"])

@@ -41,7 +41,7 @@ class Parameters(NamedTuple):
             1e-3,
             UNLIMITED,
             off=UNLIMITED,
-            starts=(10.0, 3.0, 1.0, 0.3),
+            starts=(10.0, 3.0, 1.7, 1.0, 0.6, 0.3),
             scale="spring_n_per_m * stroke_m / diaphragm_area_m2",
         ),
     ]
@@ -52,7 +52,7 @@ class Parameters(NamedTuple):
             1e-3,
             UNLIMITED,
             off=UNLIMITED,
-            starts=(10.0, 3.0, 1.0, 0.3),
+            starts=(10.0, 3.0, 1.7, 1.0, 0.6, 0.3),
             scale="spring_n_per_m * stroke_m / diaphragm_area_m2",
         ),
     ]

@@ -27,7 +27,7 @@ from workbench.fit.starts import (
     Origin,
     base_starts,
     exchanged,
-    landed_start,
+    landed_starts,
     near_start,
     strewn_starts,
     swinging_starts,
@@ -204,13 +204,13 @@ def begun_trial(
     if like.run.hidden:  # friction stands in for a play where slides land: landings do not choose its width
         begins = strewn_starts(like, added, fitted, points)
         searches += [lambda z=z: _from_afar(like, z, coarsely=True) for z in begins]  # type: ignore[misc]
-    elif base.cost > AT_THE_NOISE * 0.5 * base.count:
-        afar = landed_start(like, added, [fitted, Origin(sheet)], points)
-        chosen = partial(with_strengths, like, added, points=points)
-        searches.append(lambda: _from_afar(like, afar, chosen, coarsely=True))
     else:
         near = near_start(like, added, fitted, points)
         searches.append(lambda: ended(like, near, base.onsets_s, coarsely=True))
+        if base.cost > AT_THE_NOISE * 0.5 * base.count:
+            chosen = partial(with_strengths, like, added, points=points)
+            begins = landed_starts(like, added, fitted, Origin(sheet), points)
+            searches += [lambda z=z: _from_afar(like, z, chosen, coarsely=True) for z in begins]  # type: ignore[misc]
     ends = list(on_threads(lambda search: search(), searches, workers))
     best = min(ends, key=lambda each: each.cost)
     other_order = exchanged(like, best.z)

@@ -18,6 +18,8 @@ from workbench.model.parameters import Parameter, strengths
 
 OTHER_FRICTION = (0.5, 2.0)
 """Of the data sheet's, where its own leads to no end at the noise: what an engineer may be off by."""
+OTHER_DAMPING = 2.0
+"""Factor between two dampings that are not one: a data sheet is not off by more."""
 LESS_DAMPING = (0.7, 0.5, 0.35, 0.25)
 """The same of damping, where a stem may swing past its balance."""
 
@@ -94,17 +96,33 @@ def _at_its_static(like: Likelihood, theta: Vector, onsets_s: Vector) -> tuple[V
     return there, like.of_path(path, there)
 
 
-def landed_start(
-    like: Likelihood, added: Sequence[Parameter], origins: Sequence[Origin], points: Sequence[tuple[float, ...]] = ()
-) -> Vector:
-    """Return the coordinates that landings like best, of all strengths beside each origin.
+def landed_starts(
+    like: Likelihood,
+    added: Sequence[Parameter],
+    fitted: Origin,
+    sheet: Origin,
+    points: Sequence[tuple[float, ...]] = (),
+) -> list[Vector]:
+    """Return the coordinates that landings like best, of all strengths beside the fit and the data sheet.
+
+    Where the fit without the effect has another damping than the data sheet, it may have taken the effect's time for
+    the stem's own, of which landings know nothing: then both are searched from.
 
     Args:
         like: of the valve with the effects.
         added: their parameters.
-        origins: valves without them.
+        fitted: the fit without them, and its onsets.
+        sheet: the data sheet.
         points: values of the parameters in place of those that the effects declare.
     """
+    apart = abs(np.log(max(fitted.theta[VISCOUS], 1e-12) / max(sheet.theta[VISCOUS], 1e-12)))
+    origins = ((fitted,), (sheet,)) if apart > np.log(OTHER_DAMPING) else ((fitted, sheet),)
+    return [_landed_best(like, added, each, points) for each in origins]
+
+
+def _landed_best(
+    like: Likelihood, added: Sequence[Parameter], origins: Sequence[Origin], points: Sequence[tuple[float, ...]]
+) -> Vector:
     best, least = like.coordinates(origins[0].theta), np.inf
     for origin in origins:
         onsets_s = like.run.first_onsets_s() if origin.onsets_s is None else origin.onsets_s
