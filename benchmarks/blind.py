@@ -165,7 +165,7 @@ def _parameters(found: Diagnosis) -> dict[str, list[float]]:
     return {name: [each.value, each.lower, each.upper] for name, each in found.best.fit.parameters.items()}
 
 
-def moved(before: Line, after: Line) -> list[str]:
+def changes(before: Line, after: Line) -> list[str]:
     """Return what a case says otherwise than before."""
     said = [f"{key} {before[key]} to {after[key]}" for key in ("verdict", "sets") if before[key] != after[key]]
     for key in ("best_train_rmse_m", "best_rmse_m"):
@@ -320,7 +320,7 @@ def _print_moved(before: Sequence[Line], file: Path, arguments: argparse.Namespa
         then = by_seed.get((each["family"], each["seed"]))
         if then is None:
             continue
-        said = moved(then, each)
+        said = changes(then, each)
         print(
             f"{each['family']} {each['seed']} {then['cpu_seconds']} to {each['cpu_seconds']} s",
             *said,

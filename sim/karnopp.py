@@ -57,8 +57,8 @@ SLIP = 2
 
 TOLERANCE = 1e-5
 """Of one sub-step on the velocity, relative to |v| + v_s, where nothing else is asked for."""
-MOST_SUBSTEPS, MOST_CHANGES = 100_000, 1000
-"""Sub-steps, and changes of mode, of one step, beyond which there is no answer (NaN): no stem is so stiff."""
+MOST_SUBSTEPS, MOST_MODE_CHANGES = 100_000, 1000
+"""Of one step, beyond which there is no answer (NaN): no stem is so stiff."""
 SHORTEST_SUBSTEP = 2.0**-20
 """Sub-step, in steps, that is taken whatever its error: a kink of a force is passed there."""
 EXPONENTIAL_ANGLE = 0.15
@@ -425,7 +425,7 @@ def step(
     tau, changes = 0.0, 0
     while tau < h and not (held and mode == STUCK):
         changes += 1
-        if changes > MOST_CHANGES:
+        if changes > MOST_MODE_CHANGES:
             return nan, nan, SLIP, sigma
         if mode == STUCK:
             tau, mode, sigma = wait(valve, drive, tau, h, x, sigma, q, z)

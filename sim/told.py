@@ -54,7 +54,7 @@ LOOSE_S = 2e-3
 """Longest step of a stem that may slide, s: within a stem's own times it is fast, and has stopped again."""
 FAR_M = 1e9
 """Place of a stem that was let go and has left."""
-SETTLED = 1e-6
+SETTLED_SHARE = 1e-6
 """Of the blur: what an indication moves by in a period once its sensor has come to rest."""
 HELD_N = 1e-9
 """L of a stem that is held and bears nothing: other than 0, which says that it is not."""
@@ -200,7 +200,7 @@ def tell(
         end = k + 1
         if rests_s > 0.0:
             if now.mode == STUCK and k > 0 and not seen[k] == seen[k]:  # noqa: SIM201 -- NaN is unlike itself
-                if abs(indicated[k] - indicated[k - 1]) <= SETTLED * blur:
+                if abs(indicated[k] - indicated[k - 1]) <= SETTLED_SHARE * blur:
                     end = max(alike(k, commands, held), end)
                 for j in range(k + 1, end):
                     rests_s += periods[j]

@@ -1,4 +1,4 @@
-"""`positioner certify`: what can be proved of the law of slides on a valve that was identified."""
+"""`positioner certify`: bounds of the law of slides on a valve that was identified."""
 
 import argparse
 from pathlib import Path
@@ -10,7 +10,7 @@ if TYPE_CHECKING:
     from config.daemon_file import DaemonFile
     from positioner.control.laws.slides.certificate import Certificate, Refused
 
-HELP = "prove for an identified valve: no limit cycle, the greatest overtravel, the most slides a step; moves nothing"
+HELP = "bound for an identified valve: where moves end, the overtravel, the slides a step (a trial); moves nothing"
 EXAMPLE = "positioner certify site.toml"
 
 
@@ -20,18 +20,18 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
 
 
 def run(arguments: argparse.Namespace) -> int:
-    """Print a certificate for each valve; exit status 1 where one is refused."""
+    """Print the bounds of each valve; exit status 1 where they are refused."""
     from config.daemon_file import load_valves
     from positioner.control.laws.slides.certificate import Refused
 
-    proved = True
+    bounded = True
     source = config_file(arguments)
     for file in load_valves(source):
         found = _certificate(file, source.parent)
-        proved = proved and not isinstance(found, Refused)
+        bounded = bounded and not isinstance(found, Refused)
         for line in _lines(file, found):
             print(line)
-    return 0 if proved else 1
+    return 0 if bounded else 1
 
 
 def _certificate(file: "DaemonFile", folder: Path) -> "Certificate | Refused":
@@ -64,10 +64,10 @@ def _lines(file: "DaemonFile", found: "Certificate | Refused") -> list[str]:
 
     name, stroke_m = file.valve.name, file.valve.stroke_m
     if isinstance(found, Refused):
-        return [f"{name}: not proved: {found.why}", f"{name}: to be known better: {found.parameter}"]
+        return [f"{name}: not bounded: {found.why}", f"{name}: to be known better: {found.parameter}"]
     return [
-        f"{name}: proved for every valve inside the intervals of its identification, and every reference",
-        f"{name}: no limit cycle: each move ends within {100 * found.ends_within_m / stroke_m:.3g} % of the stroke",
+        f"{name}: bounds of valves inside the intervals of its identification; on trial: one in 1000 exceeds them",
+        f"{name}: each move ends, within {100 * found.ends_within_m / stroke_m:.3g} % of the stroke",
         f"{name}: most slides a step {found.most_slides}",
         f"{name}: greatest overtravel {100 * found.beyond_m / stroke_m:.2f} % of the stroke",
     ]

@@ -254,7 +254,7 @@ class Worker:
             self._unanswered -= 1
         if self._unanswered:
             raise TimeoutError
-        calls.send(call._replace(counts=self._counts.all))
+        calls.send(Call(call.unit, call.table, call.address, call.size, call.words, call.peer, self._counts.all))
         self._unanswered += 1
         if not calls.poll(ANSWER_WITHIN_S):
             raise TimeoutError

@@ -203,7 +203,7 @@ HEAD = "from typing import Annotated, NamedTuple\nfrom sim.effect import Paramet
         (
             HEAD + "class Parameters(NamedTuple):\n    k: Annotated[float, Parameter('k', 0.0, 1.0, guess='swpt')]\n"
             "def force(x): return x",
-            "Parameters.k: guess must be one of lowest, swept, quantum, delay, got 'swpt'",
+            "Parameters.k: guess must be one of lowest, swept, quantum, delay, lag, got 'swpt'",
         ),
     ],
 )

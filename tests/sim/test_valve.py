@@ -49,7 +49,7 @@ def test_a_stem_too_stiff_to_be_followed_has_no_answer(monkeypatch: pytest.Monke
         return F - 8e7 * math.copysign(math.sqrt(abs(stem.v)), stem.v)
 
     monkeypatch.setattr(karnopp, "force", drag)
-    monkeypatch.setattr(karnopp, "MOST_CHANGES", 20)
+    monkeypatch.setattr(karnopp, "MOST_MODE_CHANGES", 20)
     monkeypatch.setattr(karnopp, "MOST_SUBSTEPS", 200)
     valve = karnopp.karnopp(Composition.from_file(SEED).theta)
     x, v, _, _ = karnopp.step(valve, karnopp.Drive(0.0, 60e3, 0.0), 0.01, 0.02, 0.0, 0, 0.0, 1e-5, False, None, None)

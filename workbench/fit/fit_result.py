@@ -48,6 +48,7 @@ class Term(NamedTuple):
 
 
 NO_TERM = Term(0.0, 1.0)
+"""Of a kind without residuals."""
 
 
 @dataclass(frozen=True, slots=True, repr=False)

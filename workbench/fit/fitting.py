@@ -26,9 +26,9 @@ from workbench.fit.problem import Problem, problem
 from workbench.fit.starts import (
     Origin,
     base_starts,
-    exchanged,
-    landed_starts,
+    in_other_order,
     near_start,
+    starts_by_landings,
     strewn_starts,
     swinging_starts,
     with_strengths,
@@ -48,6 +48,7 @@ COARSE_ROUNDS = 2
 SAME_COST = 1.01
 """Factor on the cost, and `NATS` besides, within which two searches have come to the same."""
 NATS = 1.0
+"""Cost within which two ends are one."""
 
 
 @linear_algebra_alone()
@@ -209,11 +210,11 @@ def begun_trial(
         searches.append(lambda: ended(like, near, base.onsets_s, coarsely=True))
         if base.cost > AT_THE_NOISE * 0.5 * base.count:
             chosen = partial(with_strengths, like, added, points=points)
-            begins = landed_starts(like, added, fitted, Origin(sheet), points)
+            begins = starts_by_landings(like, added, fitted, Origin(sheet), points)
             searches += [lambda z=z: _from_afar(like, z, chosen, coarsely=True) for z in begins]  # type: ignore[misc]
     ends = list(on_threads(lambda search: search(), searches, workers))
     best = min(ends, key=lambda each: each.cost)
-    other_order = exchanged(like, best.z)
+    other_order = in_other_order(like, best.z)
     if other_order is not None and not at_the_noise(like, best.cost):
         onsets_s, _ = with_onsets(like, like.theta(other_order), COARSE_ROUNDS)
         ends.append(ended(like, other_order, onsets_s, coarsely=True))

@@ -67,7 +67,7 @@ def with_strengths(
     return _likeliest(like, [theta, *_strewn(like, added, Origin(theta), points)], like.run.first_onsets_s())
 
 
-def exchanged(like: Likelihood, z: Vector) -> Vector | None:
+def in_other_order(like: Likelihood, z: Vector) -> Vector | None:
     """Return coordinates with a lag and the stem's own time, F_v / k_s, exchanged; None of a valve without a lag.
 
     The stem follows its force as a lag does, and two lags one after another come to the same in either order, but where
@@ -96,7 +96,7 @@ def _at_its_static(like: Likelihood, theta: Vector, onsets_s: Vector) -> tuple[V
     return there, like.of_path(path, there)
 
 
-def landed_starts(
+def starts_by_landings(
     like: Likelihood,
     added: Sequence[Parameter],
     fitted: Origin,
@@ -117,10 +117,10 @@ def landed_starts(
     """
     apart = abs(np.log(max(fitted.theta[VISCOUS], 1e-12) / max(sheet.theta[VISCOUS], 1e-12)))
     origins = ((fitted,), (sheet,)) if apart > np.log(OTHER_DAMPING) else ((fitted, sheet),)
-    return [_landed_best(like, added, each, points) for each in origins]
+    return [_best_by_landings(like, added, each, points) for each in origins]
 
 
-def _landed_best(
+def _best_by_landings(
     like: Likelihood, added: Sequence[Parameter], origins: Sequence[Origin], points: Sequence[tuple[float, ...]]
 ) -> Vector:
     best, least = like.coordinates(origins[0].theta), np.inf

@@ -109,7 +109,7 @@ def block_errors(fit: Fit, split: Split) -> BlockErrors:
         InputError: nothing that was held out is judged: no slide is seen to land in it.
     """
     train, test = split.train, split.test
-    fitted, held_out = _fitted(fit, train), _held_out(fit, test)
+    fitted, held_out = _on_fitted(fit, train), _on_held_out(fit, test)
     if not np.isfinite(held_out.error_m).any():
         raise InputError(HELD_OUT_RECORDING, NO_LANDING)
     negligible_m = NEGLIGIBLE * split.scale_m
@@ -137,14 +137,14 @@ class _Told(NamedTuple):
     """How far its parameters had to go, in deviations, (parameters,)."""
 
 
-def _fitted(fit: Fit, part: Part) -> _Told:
+def _on_fitted(fit: Fit, part: Part) -> _Told:
     """Return a fit told through what it was fitted to."""
     like, theta = _likelihood(fit, part)
     onsets_s = fit.onsets_s if fit.onsets_s.size == len(like.moves) else with_onsets(like, theta)[0]
     return _at(like, part, theta, onsets_s, np.empty(0))
 
 
-def _held_out(fit: Fit, part: Part) -> _Told:
+def _on_held_out(fit: Fit, part: Part) -> _Told:
     """Return a fit told through what was held out, its parameters as what was fitted leaves them open."""
     like, theta = _likelihood(fit, part)
     onsets_s, groups = with_onsets(like, theta)
@@ -193,13 +193,13 @@ def _of_counted(like: Likelihood, groups: Groups, part: Part) -> tuple[Groups, R
 
 def event_logs(fit: Fit, part: Part) -> Column:
     """Return l_k of a fit's events and break-aways in a part, (events,)."""
-    told = _held_out(fit, part)
+    told = _on_held_out(fit, part)
     return _logs(told.like, told.groups, part)
 
 
 def event_errors_m(fit: Fit, part: Part) -> Column:
     """Return the rms error of each event of a part that counts, m; of a part without any, of all of it."""
-    told = _held_out(fit, part)
+    told = _on_held_out(fit, part)
     return _event_errors_m(told.like, told.error_m, part)
 
 
