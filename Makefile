@@ -4,7 +4,7 @@ VENV   := .venv
 BIN    := $(VENV)/bin
 READY  := $(VENV)/.ready
 
-.PHONY: venv demo test suite long lint browser bench campaign fuzz kills endurance blind journey locked sbom release-check docs clean
+.PHONY: venv demo test suite long lint browser bench campaign fuzz kills endurance blind moved journey locked sbom release-check docs clean
 
 venv: $(READY)
 
@@ -58,6 +58,9 @@ endurance: $(READY)     ## an hour at 1 kHz and a month in virtual time: does an
 
 blind: $(READY)         ## hours, can be broken off: what is missing of the blind campaign, and its tables
 	$(BIN)/python -m benchmarks.blind
+
+moved: $(READY)         ## hours, can be broken off: what the workbench says of the kept cases otherwise than before
+	$(BIN)/python -m benchmarks.blind --moved build/moved.jsonl
 
 journey: $(READY) browser ## minutes: a dropped recording with a hidden effect, the whole library, to the error at the floor, in a browser
 	$(BIN)/python -m benchmarks.workbench_journey
