@@ -51,8 +51,7 @@ def test_what_does_not_move_is_refused_with_its_reason(tmp_path: Path, capsys: p
         "reason": "the stem has not been seen to move yet",
     }
     out_said = capsys.readouterr().out
-    assert "refused (a, b, c, k, b_over_c, k_over_c, F_s/A): the stem has not been seen to move yet" in out_said
-    assert out_said.count("has not been seen to move yet") == 1
+    assert out_said.count("the stem has not been seen to move yet") == 1, "said once, of all that it is the reason of"
 
 
 def test_bad_input_is_one_line(tmp_path: Path, swung: Run, capsys: pytest.CaptureFixture[str]) -> None:
