@@ -125,10 +125,10 @@ def _base_fit(
     like = of.likelihood(composition, free)
     first, *others = starts(like)
     ends = [_settled(like, _from_afar(like, first))]
-    if not at_the_noise(like, ends[0].cost):
+    if not at_the_noise(ends[0].cost, like.count):
         ends += on_threads(lambda z: _settled(like, _from_afar(like, z)), others, workers)
     best = min(ends, key=lambda each: each.cost)
-    return _best(of, like, ends), not at_the_noise(like, best.cost)
+    return _best(of, like, ends), not at_the_noise(best.cost, like.count)
 
 
 @linear_algebra_alone()
@@ -208,14 +208,14 @@ def begun_trial(
     else:
         near = near_start(like, added, fitted, points)
         searches.append(lambda: ended(like, near, base.onsets_s, coarsely=True))
-        if base.cost > AT_THE_NOISE * 0.5 * base.count:
+        if not at_the_noise(base.cost, base.count):
             chosen = partial(with_strengths, like, added, points=points)
             begins = starts_by_landings(like, added, fitted, Origin(sheet), points)
             searches += [lambda z=z: _from_afar(like, z, chosen, coarsely=True) for z in begins]  # type: ignore[misc]
     ends = list(on_threads(lambda search: search(), searches, workers))
     best = min(ends, key=lambda each: each.cost)
     other_order = in_other_order(like, best.z)
-    if other_order is not None and not at_the_noise(like, best.cost):
+    if other_order is not None and not at_the_noise(best.cost, like.count):
         onsets_s, _ = with_onsets(like, like.theta(other_order), COARSE_ROUNDS)
         ends.append(ended(like, other_order, onsets_s, coarsely=True))
     return Trial(like, tuple(sorted(ends, key=lambda each: each.cost)))
@@ -226,7 +226,7 @@ def finished(of: Problem, trial: Trial) -> Fit:
     """Search to the end from the best valley of a trial, and from the next best if that leaves something."""
     like, (first, *others) = trial.like, trial.valleys
     ends = [_settled(like, ended(like, first.z, first.onsets_s))]
-    if not at_the_noise(like, ends[0].cost) and others and others[0].cost < NEAR * first.cost:
+    if not at_the_noise(ends[0].cost, like.count) and others and others[0].cost < NEAR * first.cost:
         ends.append(_settled(like, ended(like, others[0].z, others[0].onsets_s)))
     return _best(of, like, ends)
 
@@ -301,12 +301,12 @@ def _settled(like: Likelihood, end: End) -> End:
     return there if there.cost < end.cost else end
 
 
-def at_the_noise(like: Likelihood, cost: float) -> bool:
-    """Whether a cost leaves nothing that another start might find."""
-    return cost <= AT_THE_NOISE * 0.5 * like.count
+def at_the_noise(cost: float, count: int) -> bool:
+    """Whether the cost of so many residuals leaves nothing that another start might find."""
+    return cost <= AT_THE_NOISE * 0.5 * count
 
 
 def _best(of: Problem, like: Likelihood, ends: Sequence[End]) -> Fit:
     best = min(ends, key=lambda each: each.cost)
     same = sum(each.cost <= SAME_COST * best.cost + NATS for each in ends)
-    return fit_at(of, like, best, same + 1 if at_the_noise(like, best.cost) else same)
+    return fit_at(of, like, best, same + 1 if at_the_noise(best.cost, like.count) else same)

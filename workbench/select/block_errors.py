@@ -25,7 +25,7 @@ from sim.composition import Composition
 from sim.karnopp import Vector
 from workbench.data.held_out import HELD_OUT_RECORDING, Part, Split, residual_m
 from workbench.fit.fit_result import Fit, Terms, terms
-from workbench.fit.fitting import AT_THE_NOISE, at_the_noise, problem_of
+from workbench.fit.fitting import at_the_noise, problem_of
 from workbench.fit.likelihood import Groups, Likelihood, Rows
 from workbench.fit.minimiser import ended
 from workbench.fit.onsets import motion_rows, with_onsets
@@ -149,8 +149,8 @@ def _on_held_out(fit: Fit, part: Part) -> _Told:
     like, theta = _likelihood(fit, part)
     onsets_s, groups = with_onsets(like, theta)
     z, root = like.coordinates(theta), fit.known.root
-    fits = fit.cost <= AT_THE_NOISE * 0.5 * fit.count
-    if not (fits and z.size) or at_the_noise(like, like.cost(groups.whole)):
+    fits = at_the_noise(fit.cost, fit.count)
+    if not (fits and z.size) or at_the_noise(like.cost(groups.whole), like.count):
         return _at(like, part, theta, onsets_s, np.zeros(z.size))
     end = ended(like, z, onsets_s, held=(z, root))
     moved = root @ (end.z - z)
