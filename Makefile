@@ -84,9 +84,9 @@ release-check: $(READY) ## minutes: sdist and wheel, tried outside the tree on e
 	$(BIN)/python .ci/release_check.py
 
 docs: $(READY)          ## the documents' pictures and figures, made anew
-	$(BIN)/positioner reproduce --out docs/img
+	$(BIN)/python -m benchmarks.paper --out docs/img
 	$(BIN)/positioner demo --out demo-out && cp demo-out/run.png docs/img/demo.png
-	$(BIN)/positioner demo --loop flow --out demo-out && cp demo-out/flow_loop.png docs/img/
+	$(BIN)/python -m benchmarks.flow --out docs/img
 	$(BIN)/python -m docs.operator_picture docs/img/operator-page.png
 	$(BIN)/python -m docs.page_pictures docs/img
 	$(BIN)/python -m docs.drawings docs/img

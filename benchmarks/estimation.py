@@ -9,6 +9,7 @@ import numpy as np
 import numpy.typing as npt
 
 from benchmarks import hardships
+from benchmarks.paper import noise_table
 from config.valve_file import EffectTable, load_valve, shipped_valve
 from positioner.daemon.refinement_process import RefinementProcess
 from positioner.estimation import Estimates, Identification, IdentificationSettings
@@ -17,7 +18,6 @@ from positioner.estimation.batch import BatchSettings, identify
 from positioner.estimation.online import READINGS
 from positioner.estimation.refiner import InProcessRefiner, Refinement, RefinementJob
 from positioner.estimation.weighted import CHAINS, ROWS, Feeds, kernel
-from positioner.paper import noise_table
 from sim.valve import Valve
 
 SAMPLES = 800

@@ -18,10 +18,10 @@ from dataclasses import dataclass
 
 import numpy as np
 
+from benchmarks.paper.noise_table import NAMES, SampledMotion, bound, motion_at, true_values
 from config.valve_file import ValveFile
 from positioner.estimation.array import Array
 from positioner.estimation.batch import BatchSettings, identify
-from positioner.paper.noise_table import NAMES, SampledMotion, bound, motion_at, true_values
 
 PERIOD_S, REST, ROWS = 1e-3, 100, 800
 JITTER = 0.1

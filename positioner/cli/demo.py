@@ -11,8 +11,6 @@ What a daemon identified is compared with the truth here, where it is known; no 
 
 `--hidden` gives the valve an effect that nobody has told the daemon, finds it in the daemon's own recording, gives the
 daemon the extended valve and makes the same steps again (`parts.hidden_demo`).
-
-`--loop flow` is another one: what the laws make of a flow loop, in virtual time (`parts.flow_demo`).
 """
 
 import argparse
@@ -189,8 +187,7 @@ class DemoOutcome:
 
 def add_arguments(parser: argparse.ArgumentParser) -> None:
     """Declare the command line."""
-    parser.add_argument("--bus", choices=tuple(BUSES), help="the fieldbus (modbus); with --loop: none, in virtual time")
-    parser.add_argument("--loop", choices=("flow",), help="put each law into a flow loop, in place of the steps")
+    parser.add_argument("--bus", choices=tuple(BUSES), default="modbus", help="the fieldbus (modbus)")
     parser.add_argument(
         "--hidden",
         action="store_true",
@@ -203,26 +200,21 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
 def run(arguments: argparse.Namespace) -> int:
     """Run it; exit status 1 when a step ends too far off, or a ratio is identified too badly."""
     writable(arguments.json, "--json")
-    if arguments.loop:
-        from positioner.cli.parts.flow_demo import run_flow
-
-        return run_flow(arguments)
     if arguments.hidden:
         from positioner.cli.parts.hidden_demo import run_hidden
 
         with _folder(arguments.out) as folder:
-            return run_hidden(arguments.bus or "modbus", folder.resolve(), arguments.json)
+            return run_hidden(arguments.bus, folder.resolve(), arguments.json)
     return _run_steps(arguments)
 
 
 def _run_steps(arguments: argparse.Namespace) -> int:
-
     from config.valve_file import load_valve, shipped_valve
 
     valve = load_valve(shipped_valve("seed")).valve
     with _folder(arguments.out) as folder:
         started_s = time.monotonic()
-        outcome = _both_laws(arguments.bus or "modbus", folder, valve)
+        outcome = _both_laws(arguments.bus, folder, valve)
         _report(outcome)
         picture = _picture(folder, outcome)
         if arguments.out:

@@ -1,4 +1,4 @@
-"""A daemon's cycle on a simulated device, in one process and virtual time: for `play` and `reproduce`.
+"""A daemon's cycle on a simulated device, in one process and virtual time, as `play` runs it.
 
 The cycle, the link and the controller are the daemon's own; only the driver is the in-memory one, and the pace is
 the device's clock. The device is the one that the slaves on a bus serve, so they behave the same.

@@ -19,7 +19,7 @@ ROOMS = (
         "positioner/daemon/health",
         "positioner/estimation",
     ),
-    *("positioner/paper", "positioner/response", "positioner/virtual"),
+    *("benchmarks/paper", "positioner/response", "positioner/virtual"),
     *("workbench/blind", "workbench/compare", "workbench/data", "workbench/fit", "workbench/forces", "workbench/model"),
     *("workbench/report", "workbench/select"),
 )

@@ -6,8 +6,8 @@ from math import exp, hypot, pi, sqrt
 import numpy as np
 import pytest
 
-from positioner.virtual.flow_course import FlowCourse, course_of_stem, figures
-from positioner.virtual.flow_loop import FlowController, FlowLoop, FlowProcess
+from benchmarks.flow.course import FlowCourse, course_of_stem, figures
+from benchmarks.flow.loop import FlowController, FlowLoop, FlowProcess
 
 PROCESS = FlowProcess(time_constant_s=2.0, gain=1.5, disturbance=0.02, disturbance_period_s=90.0)
 QUIET = FlowProcess(disturbance=0.0)

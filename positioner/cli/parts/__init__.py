@@ -4,7 +4,6 @@ A command imports from here what it needs when it runs.
 
     command_finder                              which commands there are, and what an extra would add
     children, simulated_plant, pseudo_line      other commands as processes, a slave and a daemon of them, a serial line
-    flow_demo, flow_cases, flow_on_bus          `demo --loop flow`: what it says, its cases, one of them on wires
     demo_folder                                 where a demo leaves its files, and whose those there are
     daemon_address, experiment_player           where a daemon is; experiments played on its valve
     valve_test, own_valve                       what tests on the valve share; a valve on a cycle of the command's own

@@ -54,7 +54,6 @@ COMMANDS = {
     "loop": "sim,plot",
     "loops": "sim,plot",
     "bench": "sim,plot",
-    "reproduce": "sim,plot",
     "hide": "sim,plot",
     "certify": "",
     "certificates": "tls",

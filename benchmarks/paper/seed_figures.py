@@ -7,10 +7,8 @@ from typing import TYPE_CHECKING
 import matplotlib as mpl
 import numpy as np
 
-from config.codes import State
-from config.valve_file import ValveFile
-from positioner.paper.findings import LARGEST_ERROR_PU, by_the_seeds_law, seed_friction, seed_ratios
-from positioner.paper.formulas import (
+from benchmarks.paper.findings import LARGEST_ERROR_PU, by_the_seeds_law, seed_friction, seed_ratios
+from benchmarks.paper.formulas import (
     PRINTED_10,
     ParameterTracks,
     corrected_filters,
@@ -20,7 +18,9 @@ from positioner.paper.formulas import (
     solved,
     tracks,
 )
-from positioner.paper.scenario import S1_FROM_S, S2_FROM_S, UNTIL_S, ScenarioRun
+from benchmarks.paper.scenario import S1_FROM_S, S2_FROM_S, UNTIL_S, ScenarioRun
+from config.codes import State
+from config.valve_file import ValveFile
 from positioner.virtual.run_picture import STATE_COLOURS
 from positioner.virtual.true_parameters import truth
 

@@ -19,12 +19,12 @@ from math import sqrt
 
 import numpy as np
 
+from benchmarks.paper.formulas import solved
+from benchmarks.paper.scenario import ALPHA_PA, BETA_PA, OMEGA_RAD_PER_S
 from config.valve_file import ValveFile
 from positioner.estimation.array import Array
 from positioner.estimation.batch import BatchSettings, identify
 from positioner.estimation.stem_response import responses
-from positioner.paper.formulas import solved
-from positioner.paper.scenario import ALPHA_PA, BETA_PA, OMEGA_RAD_PER_S
 from sim.valve import Valve
 
 PERIODS_S = (1e-5, 1e-3, 5e-3)

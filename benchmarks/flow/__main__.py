@@ -1,24 +1,22 @@
-"""`positioner demo --loop flow`: does the positioner stop the oscillation of a flow loop?
+"""Does the positioner stop the oscillation of a flow loop? Three positioners at two periods, in virtual time.
 
-Three positioners at two periods of the cycle in virtual time; with `--bus modbus` ours alone, for a minute, on wires.
+python -m benchmarks.flow [--out DIR] [--tunings | --rivals]
 """
 
+import argparse
+import sys
 import time
-from argparse import Namespace
-from collections.abc import Iterable, Iterator
-from dataclasses import asdict
+from collections.abc import Iterable
 from pathlib import Path
 
-from config.errors import InputError
-from positioner.cli.parts.flow_cases import CLOSED_S, DEAD_BAND, POSITIONERS, FlowCase, FlowOutcome, virtual_outcome
-from positioner.cli.parts.output_files import make_folder, write_json
-from positioner.virtual.flow_course import FlowFigures
-from positioner.virtual.flow_loop import FlowController, FlowProcess
+from benchmarks.flow.cases import CLOSED_S, DEAD_BAND, PERIODS_S, POSITIONERS, FlowCase, FlowOutcome, virtual_outcome
+from benchmarks.flow.course import FlowFigures
+from benchmarks.flow.loop import FlowController, FlowProcess
+from benchmarks.flow.picture import draw_flow
+from benchmarks.flow.tunings import rivals, tunings
 
 OURS = "slides"
-PERIODS_S = (0.02, 0.1)
 CASES = tuple(FlowCase(law, period_s) for period_s in PERIODS_S for law in POSITIONERS)
-ON_BUS = FlowCase(OURS, PERIODS_S[0], settle_s=30.0, measured_s=60.0)
 HEADINGS = (
     "std, %",
     "peak to peak, %",
@@ -30,22 +28,33 @@ HEADINGS = (
 )
 
 
-def run_flow(arguments: Namespace) -> int:
-    """Run it; exit status 1 when ours leaves no less of the oscillation than another."""
-    if arguments.bus not in (None, "modbus"):
-        raise InputError(f"--bus {arguments.bus}", "with --loop flow allowed is modbus; without --bus, virtual time")
-    folder: Path | None = arguments.out
-    if folder:
-        make_folder(folder)
+def main() -> int:
+    """Print the table; exit status 1 when ours leaves no less of the oscillation than another."""
+    parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
+    parser.add_argument("--out", type=Path, metavar="DIR", help="draw the courses there")
+    parser.add_argument("--tunings", action="store_true", help="other tunings of ours and of the conventional one")
+    parser.add_argument("--rivals", action="store_true", help="published compensators, each at its best")
+    parser.add_argument("--period-ms", type=float, default=1e3 * PERIODS_S[0], help="of the cycle, with --rivals")
+    arguments = parser.parse_args()
+    if arguments.tunings or arguments.rivals:
+        _print_lines(rivals(1e-3 * arguments.period_ms) if arguments.rivals else tunings())
+        return 0
+    return compared(CASES, arguments.out)
+
+
+def compared(cases: Iterable[FlowCase], out: Path | None) -> int:
+    """Print the table of some cases and draw them in a folder, if any; return the exit status."""
     started_s = time.monotonic()
-    _print_lines(_head(arguments.bus))
-    outcomes = list(_printed(_outcomes(arguments.bus)))
+    _print_lines(_head())
+    outcomes = []
+    for case in cases:
+        outcomes.append(virtual_outcome(case))
+        _print_lines([_row(case.title, outcomes[-1].figures)])
     _print_lines(_limits(outcomes[-1]))
-    if folder:
-        print(f"picture {_picture(folder, outcomes)}")
+    if out:
+        out.mkdir(parents=True, exist_ok=True)
+        print(f"picture {_picture(out, outcomes)}")
     problems = problems_of({each.case: each.figures for each in outcomes})
-    if arguments.json:
-        write_json(arguments.json, _jsonable(outcomes, problems, time.monotonic() - started_s), indent=1)
     _print_lines(f"DOES NOT HOLD: {problem}" for problem in problems)
     print(f"{'failed' if problems else 'all holds'}, {time.monotonic() - started_s:.0f} s")
     return 1 if problems else 0
@@ -62,29 +71,14 @@ def problems_of(found: dict[FlowCase, FlowFigures]) -> list[str]:
     ]
 
 
-def _outcomes(bus: str | None) -> Iterator[FlowOutcome]:
-    if bus is None:
-        return map(virtual_outcome, CASES)
-    from positioner.cli.parts.flow_on_bus import outcome_on_modbus
-
-    return map(outcome_on_modbus, (ON_BUS,))
-
-
-def _printed(outcomes: Iterable[FlowOutcome]) -> Iterator[FlowOutcome]:
-    for outcome in outcomes:
-        _print_lines([_row(outcome.case.title, outcome.figures)])
-        yield outcome
-
-
-def _head(bus: str | None) -> list[str]:
+def _head() -> list[str]:
     process, controller = FlowProcess(), FlowController.tuned(FlowProcess(), CLOSED_S)
-    measured_s = ON_BUS.measured_s if bus else CASES[0].measured_s
     return [
         f"process {process.time_constant_s:g} s; disturbance at its input {100 * process.disturbance:g} % of full "
         f"flow, every {process.disturbance_period_s:g} s",
         f"DCS: PI every {controller.period_s:g} s, gain {controller.gain:.3g}, integral time "
         f"{controller.integral_time_s:g} s; dead band of the positioners {100 * DEAD_BAND:g} %",
-        f"{measured_s:g} s in steady state, {f'on {bus}' if bus else 'in virtual time'}; flows in % of full flow",
+        f"{CASES[0].measured_s:g} s in steady state, in virtual time; flows in % of full flow",
         f"{'':24}" + "".join(f"{each:>16}" for each in HEADINGS),
     ]
 
@@ -113,8 +107,6 @@ def _percent(share: float, digits: int = 2) -> str:
 
 
 def _picture(folder: Path, outcomes: list[FlowOutcome]) -> Path:
-    from positioner.virtual.flow_picture import draw_flow
-
     path = folder / "flow_loop.png"
     titles = {
         f"{each.case.title}: std {_percent(each.figures.deviation_std)} %, "
@@ -126,11 +118,10 @@ def _picture(folder: Path, outcomes: list[FlowOutcome]) -> Path:
     return path
 
 
-def _jsonable(outcomes: list[FlowOutcome], problems: list[str], seconds: float) -> dict[str, object]:
-    cases = [{**asdict(each.case), **asdict(each.figures)} for each in outcomes]
-    return {"cases": cases, "problems": problems, "seconds": seconds}
-
-
 def _print_lines(lines: Iterable[str]) -> None:
     for line in lines:
         print(line, flush=True)
+
+
+if __name__ == "__main__":
+    sys.exit(main())

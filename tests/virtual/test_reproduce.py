@@ -11,13 +11,13 @@ from pathlib import Path
 import numpy as np
 import pytest
 
+from benchmarks.paper import noise_table, scenario
+from benchmarks.paper.__main__ import reproduced
+from benchmarks.paper.findings import CLAIMS, SeedFindings, findings
+from benchmarks.paper.formulas import Erratum, errata, largest_sample_pu, refusal_of_printed_static_friction
+from benchmarks.paper.scenario import HONEST_SINE, LITERAL, NONE, S2_FROM_S, WHITE, Noise, ScenarioRun, run_scenario
 from config.codes import Refusal
 from config.valve_file import ValveFile, load_valve, shipped_valve
-from positioner.cli.main import main
-from positioner.paper import noise_table, scenario
-from positioner.paper.findings import CLAIMS, SeedFindings, findings
-from positioner.paper.formulas import Erratum, errata, largest_sample_pu, refusal_of_printed_static_friction
-from positioner.paper.scenario import HONEST_SINE, LITERAL, NONE, S2_FROM_S, WHITE, Noise, ScenarioRun, run_scenario
 
 PERIOD_S, COARSE_S = 1e-4, 5e-4
 FILE = load_valve(shipped_valve("seed"))
@@ -164,8 +164,7 @@ def test_command_writes_figures_and_numbers_and_says_what_does_not_hold(
     monkeypatch.setattr(scenario, "run_scenario", run_of)
     monkeypatch.setattr(scenario, "SEED_PERIOD_S", COARSE_S)
     monkeypatch.setattr(noise_table, "PERIODS_S", (1e-3,))
-    words = ["reproduce", "--out", str(tmp_path / "figures"), "--json", str(tmp_path / "numbers.json"), "--seeds", "3"]
-    assert main(words) == 1
+    assert reproduced(tmp_path / "figures", tmp_path / "numbers.json", seeds=3) == 1
     assert "DOES NOT HOLD: claim a, noise none: 0.13, limit 0.01" in capsys.readouterr().out
     names = {f"seed-{name}.png" for name in ("fig3", "fig4", "fig5", "fig6", "fig7", "derivatives")}
     assert {path.name for path in (tmp_path / "figures").iterdir()} == names | {"noise-table.txt"}
@@ -192,14 +191,3 @@ def test_the_noise_table_sets_ours_at_the_bound_and_the_seeds_far_off() -> None:
     assert found.valid == (1.0,) * 6
     assert found.bound[0] == pytest.approx(1.2e-3, rel=0.02)
     assert all(abs(bias or 1) > 0.1 for bias in found.seed_bias[:3])
-
-
-def test_a_single_seed_is_refused(capsys: pytest.CaptureFixture[str]) -> None:
-    assert main(["reproduce", "--seeds", "1"]) == 2
-    assert "--seeds: must be at least 2" in capsys.readouterr().err
-
-
-def test_a_folder_that_cannot_be_made_is_one_line(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
-    (tmp_path / "file").touch()
-    assert main(["reproduce", "--out", str(tmp_path / "file")]) == 2
-    assert "cannot be written" in capsys.readouterr().err

@@ -9,10 +9,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from config.valve_file import ValveFile, ValveParameters
-from positioner.estimation import Ratios
-from positioner.estimation.array import Array
-from positioner.paper.formulas import (
+from benchmarks.paper.formulas import (
     QUANTITIES,
     ParameterTracks,
     corrected_filters,
@@ -21,7 +18,10 @@ from positioner.paper.formulas import (
     friction,
     tracks,
 )
-from positioner.paper.scenario import DOWN_PU, S1_FROM_S, S2_FROM_S, UNTIL_S, UP_PU, ScenarioRun
+from benchmarks.paper.scenario import DOWN_PU, S1_FROM_S, S2_FROM_S, UNTIL_S, UP_PU, ScenarioRun
+from config.valve_file import ValveFile, ValveParameters
+from positioner.estimation import Ratios
+from positioner.estimation.array import Array
 from positioner.virtual.true_parameters import truth
 from sim.valve import Valve
 

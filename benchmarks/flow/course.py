@@ -18,10 +18,10 @@ from positioner.daemon.health.travel_accumulator import TravelAccumulator
 from positioner.virtual.virtual_cycle import played
 
 if TYPE_CHECKING:
+    from benchmarks.flow.loop import FlowLoop
     from positioner.control.requests import Requests
     from positioner.daemon.cycle import Cycle
     from positioner.daemon.snapshot import Snapshot
-    from positioner.virtual.flow_loop import FlowLoop
 
 Series = np.ndarray[tuple[int], np.dtype[np.float64]]
 

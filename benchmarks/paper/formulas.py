@@ -13,13 +13,7 @@ from math import exp
 
 import numpy as np
 
-from config.errors import InputError
-from config.loading import validated
-from config.valve_file import ValveFile, ValveParameters
-from positioner.estimation import Ratios
-from positioner.estimation.array import Array
-from positioner.estimation.derivatives import weights
-from positioner.paper.scenario import (
+from benchmarks.paper.scenario import (
     AMPLITUDE_PU,
     HONEST_SINE,
     LITERAL,
@@ -30,6 +24,12 @@ from positioner.paper.scenario import (
     ScenarioRun,
     derivative_window_s,
 )
+from config.errors import InputError
+from config.loading import validated
+from config.valve_file import ValveFile, ValveParameters
+from positioner.estimation import Ratios
+from positioner.estimation.array import Array
+from positioner.estimation.derivatives import weights
 from positioner.virtual.true_parameters import truth
 from sim.valve import Valve
 

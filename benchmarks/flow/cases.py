@@ -1,4 +1,4 @@
-"""Cases of `demo --loop flow`: a positioner on the simulated valve in a flow loop, in virtual time or on a bus.
+"""A positioner on the simulated valve in a flow loop, in virtual time.
 
 The daemons know the valve from a staircase of slides, whatever their law, so that it is the laws that are compared.
 """
@@ -6,6 +6,8 @@ The daemons know the valve from a staircase of slides, whatever their law, so th
 from collections.abc import Callable
 from dataclasses import dataclass, replace
 
+from benchmarks.flow.course import FlowCourse, FlowFigures, course_in, course_of_stem, figures
+from benchmarks.flow.loop import FlowController, FlowLoop, FlowProcess
 from config.codes import Mode
 from config.daemon_file import DaemonFile
 from config.errors import CommandFailed
@@ -14,9 +16,6 @@ from config.slave_file import SlaveFile
 from config.valve_file import load_valve, shipped_valve
 from positioner.control.requests import QUIET, Requests
 from positioner.control.settings import Settings
-from positioner.daemon.cycle import Cycle
-from positioner.virtual.flow_course import FlowCourse, FlowFigures, course_in, course_of_stem, figures
-from positioner.virtual.flow_loop import FlowController, FlowLoop, FlowProcess
 from positioner.virtual.virtual_cycle import identified, virtual_cycle
 from sim.slave.modbus_slave import device_of
 
@@ -30,6 +29,8 @@ NOISE_PU = 1e-4
 CLOSED_S = 6.0
 """λ of the DCS's controller: three times the process's time constant, as is usual."""
 STALE_PERIODS = 3
+PERIODS_S = (0.02, 0.1)
+"""Of the cycle."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -93,11 +94,6 @@ def virtual_outcome(case: FlowCase, tuned: Callable[[Settings], Settings] = lamb
         reference_m, writes = reference_pu * STROKE_M, before.reference_writes + 1
         cycle.requests = replace(before, eta=QUIET, reference_m=reference_m, reference_writes=writes)
 
-    return outcome_on(case, cycle, write)
-
-
-def outcome_on(case: FlowCase, cycle: Cycle, write: Callable[[float], None]) -> FlowOutcome:
-    """Close the loop round a cycle of an identified valve, `write` taking each reference, p.u., to the daemon."""
     loop = FlowLoop(FlowProcess(), _controller(case), cycle.snapshot.sample.time_s)
     course = course_in(cycle, loop, write, STROKE_M, case.settle_s + case.measured_s)
     frictionless, alone = (FlowLoop(FlowProcess(), _controller(case)) for _ in range(2))

@@ -6,7 +6,7 @@ from typing import TYPE_CHECKING
 
 import matplotlib as mpl
 
-from positioner.virtual.flow_course import FlowCourse
+from benchmarks.flow.course import FlowCourse
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes

@@ -1,57 +1,50 @@
-"""`positioner reproduce`: the seed's figures and claims, as printed, corrected, and under honest noise.
+"""The paper's figures and claims: as printed, corrected, and under honest noise. `python -m benchmarks.paper`: minutes.
 
 In process and virtual time, at the seed's 10 us; the last row of each table is a sample time a fieldbus can give. The
 noise table at the end sets the seed's identifier, ours and the Cramér-Rao bound side by side, many seeds each.
 """
 
 import argparse
+import json
+import sys
 import time
 from collections.abc import Iterable
 from dataclasses import asdict
 from pathlib import Path
-from typing import TYPE_CHECKING
 
-from positioner.cli.parts.output_files import make_folder, write_json
-
-if TYPE_CHECKING:
-    from positioner.paper.findings import SeedFindings
-    from positioner.paper.formulas import Erratum
-    from positioner.paper.noise_table import Cell
-
-HELP = "print the paper's figures and claims: as printed, corrected, and under honest noise; takes two minutes"
-EXAMPLE = "positioner reproduce --out figures --json reproduced.json"
+from benchmarks.paper import scenario
+from benchmarks.paper.findings import CLAIMS, SeedFindings, findings
+from benchmarks.paper.formulas import Erratum, errata, refusal_of_printed_static_friction
+from benchmarks.paper.noise_table import Cell, lines, table
+from benchmarks.paper.scenario import HONEST_SINE, LITERAL, NONE, WHITE
+from benchmarks.paper.seed_figures import draw_all
+from config.codes import Refusal
+from config.json_value import json_value
+from config.valve_file import load_valve, shipped_valve
 
 FIELDBUS_PERIOD_S = 1e-3
 OWN_NOISE = 2
 """So many of the first cases are noise as the seed says it is: its claims must hold there."""
 
 
-def add_arguments(parser: argparse.ArgumentParser) -> None:
-    """Declare the command line."""
+def main() -> int:
+    """Run it; exit status 1 when a claim does not hold without noise, or a printed form is no worse than ours."""
+    parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
     parser.add_argument("--out", type=Path, metavar="DIR", help="draw the figures there")
     parser.add_argument("--json", type=Path, metavar="FILE", help="write the numbers as JSON")
-    parser.add_argument("--seeds", type=int, default=100, help="runs per cell of the noise table (100)")
+    parser.add_argument("--seeds", type=int, default=100, help="runs per cell of the noise table, 2 or more (100)")
+    arguments = parser.parse_args()
+    return reproduced(arguments.out, arguments.json, arguments.seeds)
 
 
-def run(arguments: argparse.Namespace) -> int:
-    """Run it; exit status 1 when a claim does not hold without noise, or a printed form is no worse than ours."""
-    from config.errors import InputError
-    from config.valve_file import load_valve, shipped_valve
-    from positioner.paper.findings import findings
-    from positioner.paper.formulas import errata, refusal_of_printed_static_friction
-    from positioner.paper.noise_table import lines, table
-    from positioner.paper.scenario import HONEST_SINE, LITERAL, NONE, SEED_PERIOD_S, WHITE, run_scenario
-
-    if arguments.seeds < 2:
-        raise InputError("--seeds", f"must be at least 2, it is {arguments.seeds}")
+def reproduced(out: Path | None, numbers: Path | None, seeds: int) -> int:
+    """Print all, write figures and numbers if asked to, and return the exit status."""
     started_s = time.monotonic()
-    if arguments.out:
-        make_folder(arguments.out)
     file = load_valve(shipped_valve("seed"))
-    cases = [(noise, SEED_PERIOD_S) for noise in (NONE, LITERAL, HONEST_SINE, WHITE)] + [(WHITE, FIELDBUS_PERIOD_S)]
+    cases = [(noise, scenario.SEED_PERIOD_S) for noise in (NONE, LITERAL, HONEST_SINE, WHITE)]
     courses = []
-    for noise, period_s in cases:
-        courses.append(run_scenario(file, noise, period_s))
+    for noise, period_s in [*cases, (WHITE, FIELDBUS_PERIOD_S)]:
+        courses.append(scenario.run_scenario(file, noise, period_s))
         print(f"S3, S1, S2 at {_period(period_s)}, noise {noise.name}: {len(courses[-1].time_s)} cycles", flush=True)
     wrong = errata(courses[0], file)
     refusal = refusal_of_printed_static_friction(file.valve)
@@ -61,24 +54,22 @@ def run(arguments: argparse.Namespace) -> int:
     _print_lines(_kept_lines(found[OWN_NOISE]))
     _print_lines(_law_lines(found))
     _print_lines(_claim_lines(found))
-    cells = list(table(file, arguments.seeds))
+    cells = list(table(file, seeds))
     _print_lines(lines(cells))
-    if arguments.out:
-        (arguments.out / "noise-table.txt").write_text("\n".join(lines(cells)) + "\n", encoding="utf-8")
-        from positioner.paper.seed_figures import draw_all
-
-        for path in draw_all(arguments.out, courses[0], (courses[2], courses[3]), file):
-            print(path)
-    if arguments.json:
-        write_json(arguments.json, _jsonable(wrong, refusal, found, cells, time.monotonic() - started_s), indent=1)
+    if out:
+        out.mkdir(parents=True, exist_ok=True)
+        (out / "noise-table.txt").write_text("\n".join(lines(cells)) + "\n", encoding="utf-8")
+        _print_lines(map(str, draw_all(out, courses[0], (courses[2], courses[3]), file)))
+    if numbers:
+        told = json_value(_jsonable(wrong, refusal, found, cells, time.monotonic() - started_s))
+        numbers.write_text(json.dumps(told, indent=1, allow_nan=False) + "\n", encoding="utf-8")
     problems = _problems(wrong, refusal, found)
-    for problem in problems:
-        print(f"DOES NOT HOLD: {problem}")
+    _print_lines(f"DOES NOT HOLD: {problem}" for problem in problems)
     print(f"{'failed' if problems else 'done'}, {time.monotonic() - started_s:.0f} s")
     return 1 if problems else 0
 
 
-def _problems(wrong: list["Erratum"], refusal: str, found: list["SeedFindings"]) -> list[str]:
+def _problems(wrong: list[Erratum], refusal: str, found: list[SeedFindings]) -> list[str]:
     """Return what is not as docs/seed.md says it is."""
     problems = [
         f"{each.where}, {each.quantity}: as printed {each.printed:g}, corrected {each.corrected:g}, true {each.true:g}"
@@ -100,7 +91,7 @@ def _print_lines(lines: Iterable[str]) -> None:
         print(line)
 
 
-def _errata_lines(wrong: list["Erratum"], refusal: str) -> list[str]:
+def _errata_lines(wrong: list[Erratum], refusal: str) -> list[str]:
     return [
         "",
         "as printed and corrected, on the same motion without noise",
@@ -113,7 +104,7 @@ def _errata_lines(wrong: list["Erratum"], refusal: str) -> list[str]:
     ]
 
 
-def _estimate_lines(found: list["SeedFindings"]) -> list[str]:
+def _estimate_lines(found: list[SeedFindings]) -> list[str]:
     columns = ("a_e", "b_e", "c_e", "worst", "k_e mean", "std", "last")
     lines = [
         "",
@@ -137,16 +128,14 @@ def _estimate_lines(found: list["SeedFindings"]) -> list[str]:
     return lines + list(_refusal_lines(found))
 
 
-def _refusal_lines(found: list["SeedFindings"]) -> Iterable[str]:
-    from config.codes import Refusal
-
+def _refusal_lines(found: list[SeedFindings]) -> Iterable[str]:
     for each in found:
         for reason in dict.fromkeys(one.reason for one in each.identified if one.reason != Refusal.VALID.name):
             names = ", ".join(one.name for one in each.identified if one.reason == reason)
             yield f"  {each.noise}, {_period(each.period_s)}: {names} refused: {Refusal[reason].text}"
 
 
-def _law_lines(found: list["SeedFindings"]) -> list[str]:
+def _law_lines(found: list[SeedFindings]) -> list[str]:
     lines = [
         "",
         "largest error of the true stem over the last 0.2 s, p.u. of stroke",
@@ -161,7 +150,7 @@ def _law_lines(found: list["SeedFindings"]) -> list[str]:
     return lines
 
 
-def _kept_lines(each: "SeedFindings") -> list[str]:
+def _kept_lines(each: SeedFindings) -> list[str]:
     return [
         "",
         f"error, p.u., that a single k_e leaves under the {each.noise}, by each reading of the text; plainest first",
@@ -173,9 +162,7 @@ def _kept_lines(each: "SeedFindings") -> list[str]:
     ]
 
 
-def _claim_lines(found: list["SeedFindings"]) -> list[str]:
-    from positioner.paper.findings import CLAIMS
-
+def _claim_lines(found: list[SeedFindings]) -> list[str]:
     lines = ["", "the seed's claims", *(f"  {claim:9} {text}" for claim, text in CLAIMS.items())]
     lines.append(f"{'noise':20}{'sample':>8}" + "".join(f"{claim:>16}" for claim in CLAIMS))
     for each in found:
@@ -185,7 +172,7 @@ def _claim_lines(found: list["SeedFindings"]) -> list[str]:
     return [*lines, f"limits: {limits}", ""]
 
 
-def _head(each: "SeedFindings") -> str:
+def _head(each: SeedFindings) -> str:
     return f"{each.noise:20}{_period(each.period_s):>8}"
 
 
@@ -213,7 +200,7 @@ def _figure(figure: float) -> str:
 
 
 def _jsonable(
-    wrong: list["Erratum"], refusal: str, found: list["SeedFindings"], cells: list["Cell"], seconds: float
+    wrong: list[Erratum], refusal: str, found: list[SeedFindings], cells: list[Cell], seconds: float
 ) -> dict[str, object]:
     return {
         "errata": wrong,
@@ -224,10 +211,14 @@ def _jsonable(
     }
 
 
-def _case(each: "SeedFindings") -> dict[str, object]:
+def _case(each: SeedFindings) -> dict[str, object]:
     return {
         **asdict(each),
         "solved": [{**asdict(one), "error": one.error} for one in each.solved],
         "identified": [{**asdict(one), "error": one.value / one.true - 1} for one in each.identified],
         "claims": [{**asdict(claim), "holds": claim.holds} for claim in each.claims],
     }
+
+
+if __name__ == "__main__":
+    sys.exit(main())

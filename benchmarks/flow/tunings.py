@@ -1,28 +1,24 @@
-"""The flow loop of `positioner demo --loop flow` under other tunings: is the comparison fair, and what does it hang on?
+"""The flow loop under other tunings: is the comparison fair, and what does it hang on?
 
-    python -m benchmarks.flow_loop [--rivals]
+`--rivals`: one table of our laws and of the compensators of `rival_laws`, each with the best of a grid of the tunings
+that its paper gives, then with the best of those that move the stem, and what each costs the valve. The dead band of
+the two-move method is ours.
 
-`--rivals` prints one table: our laws, the compensators of `benchmarks.rival_laws`, each with the best of a grid of the
-tunings that its paper gives, then with the best of those that move the stem, and what each costs the valve. The dead
-band of the two-move method is ours.
-
-Without it, first the conventional positioner, K and R over a grid, gain margin 2 at the least: what ours is compared
-with is the pair that leaves the least deviation, summed over both periods, among those that wore the valve no more than
-ours when ours made two to three times today's strokes; it wears the valve more than ours now.
-Then ours with other dead bands, with a least time between excursions, and under a faster controller. Takes two minutes.
+`--tunings`: the conventional positioner, K and R over a grid, gain margin 2 at the least. What ours is compared with
+is the pair that leaves the least deviation, summed over both periods, among those that wore the valve no more than ours
+when ours made two to three times today's strokes; it wears the valve more than ours now. Then ours with other dead
+bands, with a least time between excursions, and under a faster controller. Takes two minutes.
 """
 
-import argparse
 from collections.abc import Iterator
 from dataclasses import replace
 from itertools import product
 
-from benchmarks.rival_laws import ADDED, RivalSettings
-from positioner.cli.parts.flow_cases import POSITIONERS, FlowCase, virtual_outcome
-from positioner.cli.parts.flow_demo import PERIODS_S
+from benchmarks.flow.cases import PERIODS_S, POSITIONERS, FlowCase, virtual_outcome
+from benchmarks.flow.course import FlowFigures
+from benchmarks.flow.rival_laws import ADDED, RivalSettings
 from positioner.control.laws.conventional.conventional_law import ConventionalSettings
 from positioner.control.settings import Settings
-from positioner.virtual.flow_course import FlowFigures
 
 GAINS = (0.1, 0.25, 0.4)
 RATES_PER_S = (1.0, 2.0, 4.0, 8.0, 16.0, 50.0)
@@ -56,7 +52,7 @@ def figures_of_conventional(period_s: float, gain: float, rate_per_s: float) -> 
     return virtual_outcome(FlowCase("conventional", period_s), tuned).figures
 
 
-def lines() -> Iterator[str]:
+def tunings() -> Iterator[str]:
     """Yield the tables line by line."""
     yield f"{'conventional':28}" + _heads("added, %", "strokes/min", "reversals/min")
     for gain, rate_per_s in product(GAINS, RATES_PER_S):
@@ -119,16 +115,6 @@ def _rival_row(name: str, found: FlowFigures) -> str:
     )
 
 
-def main() -> None:
-    """Print the tables."""
-    parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
-    parser.add_argument("--rivals", action="store_true")
-    parser.add_argument("--period-ms", type=float, default=1e3 * PERIODS_S[0])
-    arguments = parser.parse_args()
-    for line in rivals(1e-3 * arguments.period_ms) if arguments.rivals else lines():
-        print(line, flush=True)
-
-
 def _heads(*names: str) -> str:
     return "".join(f"{f'{1e3 * each:g} ms: std, %':>20}" + "".join(f"{n:>15}" for n in names) for each in PERIODS_S)
 
@@ -139,7 +125,3 @@ def _line(name: str, found: list[FlowFigures]) -> str:
         f"{each.strokes_per_minute:15.2f}{each.reversals_per_minute:15.1f}"
         for each in found
     )
-
-
-if __name__ == "__main__":
-    main()
