@@ -1,4 +1,4 @@
-"""Promises of `docs/reliability.md`, each broken on purpose: does the test that holds it turn red?
+"""Promises of `docs/promises.md`, each broken on purpose: does the test that holds it turn red?
 
     python -m benchmarks.broken_promises
 

@@ -1,6 +1,6 @@
 """The tables of the documents that repeat a code, written from the code: `python -m docs.code_tables`.
 
-`codes.md` is written whole; in `health.md`, `history.md`, `law.md` and `reliability.md` what stands between marks is.
+`codes.md` is written whole; in `history.md`, `law.md` and `reliability.md` what stands between marks is.
 """
 
 from dataclasses import fields
@@ -16,14 +16,10 @@ from positioner.daemon.service_state import table
 from positioner.history.entries import TABLES, Entry
 
 HERE = Path(__file__).parent
-BEGIN = "<!-- classes: written by `python -m docs.code_tables` -->"
-END = "<!-- end of the classes -->"
 STATES_BEGIN = "<!-- states: written by `python -m docs.code_tables` -->"
 STATES_END = "<!-- end of the states -->"
 PERMISSIVES_BEGIN = "<!-- permissives: written by `python -m docs.code_tables` -->"
 PERMISSIVES_END = "<!-- end of the permissives -->"
-EVENTS_BEGIN = "<!-- events: written by `python -m docs.code_tables` -->"
-EVENTS_END = "<!-- end of the events -->"
 TRANSITIONS_BEGIN = "<!-- transitions: written by `python -m docs.code_tables` -->"
 TRANSITIONS_END = "<!-- end of the transitions -->"
 TABLES_BEGIN = "<!-- tables: written by `python -m docs.code_tables` -->"
@@ -50,20 +46,15 @@ def codes() -> str:
 
 def _section(code: type[Code], register: str) -> str:
     said = (code.__doc__ or "").strip().partition("\n")[0]
-    rows = [f"- {int(each)} `{each.name}`: {each.text}" for each in code]
+    rows = [f"- {int(each)} `{each.name}`: {each.text}{_beside(each)}" for each in code]
     return "\n".join([f"## {code.__name__}: register {register}", "", said, "", *rows, ""])
 
 
-def renewed(document: str) -> str:
-    """Return `health.md` with the NE 107 classes between its marks."""
-    head, _, rest = document.partition(BEGIN)
-    _, _, tail = rest.partition(END)
-    rows = [f"| {int(status)} {status.text} | {_causes(status)} |" for status in sorted(Ne107Status, reverse=True)]
-    return "\n".join([head + BEGIN, "| class | causes |", "|---|---|", *rows, END + tail])
-
-
-def _causes(status: Ne107Status) -> str:
-    return "<br>".join(f"{int(cause)} {cause.text}" for cause, own in CLASS.items() if own is status)
+def _beside(each: Code) -> str:
+    """Return the NE 107 class of a cause, and the code that numbers the cause of an event."""
+    if isinstance(each, Ne107Cause) and each:
+        return f" ({CLASS[each].text})" if each in CLASS else " (class by the file)"
+    return f" (its cause is of {CAUSES[each].__name__})" if isinstance(each, EventKind) and each in CAUSES else ""
 
 
 def with_states(document: str) -> str:
@@ -72,14 +63,11 @@ def with_states(document: str) -> str:
     return _between(document, PERMISSIVES_BEGIN, PERMISSIVES_END, permissives())
 
 
-def with_events(document: str) -> str:
-    """Return `history.md` with the kinds of events and the tables of the file between their marks."""
-    kinds = [f"| {int(kind)} | `{kind.name}` | {kind.text} | {_cause(kind)} |" for kind in EventKind if kind]
-    events = ["| number | name | | cause |", "|---|---|---|---|", *kinds]
+def with_tables(document: str) -> str:
+    """Return `history.md` with the tables of the file between their marks."""
     tables = [
         f"| `{each.TABLE}` | {', '.join(_column(each, field.name) for field in fields(each))} |" for each in TABLES
     ]
-    document = _between(document, EVENTS_BEGIN, EVENTS_END, events)
     columns = ["| table | columns; what tells a row from another in bold |", "|---|---|", *tables]
     return _between(document, TABLES_BEGIN, TABLES_END, columns)
 
@@ -99,10 +87,6 @@ def _named(states: tuple[type[State], ...]) -> str:
     return ", ".join(each.__name__ for each in states) or "the same, and more is known"
 
 
-def _cause(kind: EventKind) -> str:
-    return f"a number of `{CAUSES[kind].__name__}`" if kind in CAUSES else "a text"
-
-
 def _column(of: type[Entry], name: str) -> str:
     return f"**{name}**" if name in of.KEY else name
 
@@ -114,11 +98,9 @@ def _between(document: str, begin: str, end: str, lines: list[str]) -> str:
 
 if __name__ == "__main__":
     (HERE / "codes.md").write_text(codes(), encoding="utf-8")
-    health = HERE / "health.md"
-    health.write_text(renewed(health.read_text(encoding="utf-8")), encoding="utf-8")
     reliability = HERE / "reliability.md"
     reliability.write_text(with_states(reliability.read_text(encoding="utf-8")), encoding="utf-8")
     law = HERE / "law.md"
     law.write_text(with_transitions(law.read_text(encoding="utf-8")), encoding="utf-8")
     history = HERE / "history.md"
-    history.write_text(with_events(history.read_text(encoding="utf-8")), encoding="utf-8")
+    history.write_text(with_tables(history.read_text(encoding="utf-8")), encoding="utf-8")

@@ -187,8 +187,9 @@ def test_what_stands_in_backticks_exists(document: Path) -> None:
 
 @each_document
 def test_every_command_line_can_be_parsed(document: Path) -> None:
-    text = document.read_text(encoding="utf-8").partition("\n## How to add\n")[0]  # what is added, test_recipes follows
-    for line in lines(text):
+    if document.name == "adding.md":  # what is added, test_recipes follows
+        return
+    for line in lines(document.read_text(encoding="utf-8")):
         words = shlex.split(line, comments=True) if re.match(r"(positioner|make|python) ", line) else []
         if words[:1] == ["positioner"]:
             parser().parse_args([word for word in words[1:] if word not in {"&", "|"}])

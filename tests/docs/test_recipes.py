@@ -1,4 +1,4 @@
-"""The recipes of `docs/architecture.md`, each followed block by block in a copy of the tree."""
+"""The recipes of `docs/adding.md`, each followed block by block in a copy of the tree."""
 
 import os
 import re
@@ -25,12 +25,12 @@ ROOMS = (
     "webpage",
     "workbench",
 )
-GUIDE = (ROOT / "docs" / "architecture.md").read_text(encoding="utf-8").partition("\n## How to add\n")[2]
-RECIPES = dict(re.findall(r"^### (.+)\n((?:(?!^##).*\n)+)", GUIDE, re.MULTILINE))
+GUIDE = (ROOT / "docs" / "adding.md").read_text(encoding="utf-8")
+RECIPES = dict(re.findall(r"^## (.+)\n((?:(?!^##).*\n)+)", GUIDE, re.MULTILINE))
 BEING_WRITTEN = "*.pyc.*"
 """A compiled module that another process has not yet given its name."""
 BLOCK = re.compile(r"^```(\w+) ?([\w/.]*)\n(.*?)^```", re.MULTILINE | re.DOTALL)
-WANTED = {"An effect", "A register", "A fault", "A command", "An estimator", "A law", "A report section"}
+WANTED = {"An effect", "A register", "A fault", "A command", "A law"}
 
 
 def test_there_is_a_recipe_for_all_that_is_added_often() -> None:
