@@ -6,7 +6,6 @@
     freshness                       whether what was read last is still so
     waiting_reference               a reference that automatic will follow, and who wrote it
     trends                          the last minutes, with their gaps, and the states as bands
-    friction_file                   friction against its baseline, kept over restarts
     happened                        what has happened, from the daemon's history or as seen, each thing once
     words                           codes, causes and estimates in words
     poller                          reads a daemon in a thread of its own

@@ -6,13 +6,12 @@ One thread reads, others ask.
 
 import math
 from collections import deque
-from collections.abc import Callable, Iterable, Mapping
+from collections.abc import Iterable, Mapping
 from dataclasses import dataclass
 from threading import Lock
 
 from config.recording import Column
 from northbound.observer.freshness import Freshness, FreshnessMemory, after_failure, after_reading, freshness
-from northbound.observer.friction_file import FrictionRow
 from northbound.observer.happened import SeenEvent, served_event
 from northbound.observer.trends import Trend
 from northbound.observer.words import code_text
@@ -22,6 +21,8 @@ TREND_S = 600.0
 FRICTION_EVERY_S = 60.0
 FRICTION_KEPT = 43_200
 """A month of minutes."""
+FrictionRow = tuple[float, float, float]
+"""Time, s, friction and its baseline, Pa."""
 MOST_EVENTS = 200
 
 WATCHED = {
@@ -73,7 +74,6 @@ class ValveView:
         stroke_m: travel of 1 p.u.; None where nobody said: the positions in p.u. and in m tell.
         poll_s: how far readings are apart.
         seen: rows of friction that were seen before, by the clock of the readings.
-        keep: is given each new one.
     """
 
     def __init__(
@@ -83,7 +83,6 @@ class ValveView:
         poll_s: float,
         *,
         seen: Iterable[FrictionRow] = (),
-        keep: Callable[[FrictionRow], None] | None = None,
     ) -> None:
         self.name = name
         self.poll_s = poll_s
@@ -92,7 +91,6 @@ class ValveView:
         self._values: Mapping[str, float] = {}
         self._trend = Trend(round(TREND_S / poll_s))
         self._friction: deque[FrictionRow] = deque(seen, maxlen=FRICTION_KEPT)
-        self._keep = keep
         self._events: deque[SeenEvent] = deque(maxlen=MOST_EVENTS)
         self._served: deque[Event] = deque(maxlen=MOST_EVENTS)
         self._lock = Lock()
@@ -115,8 +113,6 @@ class ValveView:
                 self._enter(time_s, freshness(memory, time_s))
             if "friction" in values and time_s >= self._friction_due_s:
                 self._friction.append((time_s, values["friction"], values["friction_baseline"]))
-                if self._keep is not None:
-                    self._keep(self._friction[-1])
 
     def lose(self, time_s: float, why: str) -> None:
         """Take it that a request was not answered, and why."""

@@ -2,21 +2,26 @@
 
 import time
 from collections.abc import Iterator, Mapping, Sequence
-from contextlib import ExitStack, contextmanager
+from contextlib import ExitStack, contextmanager, suppress
 from dataclasses import dataclass, field
+from math import isfinite
 from pathlib import Path
 
 from config.daemon_file import DaemonFile
+from config.errors import InputError
 from config.roles import Role
 from config.tls_table import Tls
-from northbound.observer.friction_file import FrictionFile
 from northbound.observer.poller import POLL_S, REPLY_WITHIN_S, Poller
 from northbound.observer.valve_commands import ValveCommands
 from northbound.observer.valve_tests import ValveTests
-from northbound.observer.valve_view import FRICTION_KEPT, ValvePicture, ValveView
+from northbound.observer.valve_view import ValvePicture, ValveView
 from positioner.dcs import Dcs, DcsError
+from positioner.history import HistoryReader
+from positioner.history.entries import HealthHour
 
 WRITE_WITHIN_S = 2.0
+FRICTION_KEPT_HOURS = 720
+"""A month."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -36,8 +41,6 @@ class Place:
     history: Path | None = None
     range_pa: tuple[float, float] | None = None
     """Of the commands."""
-    keep: Path | None = None
-    """The folder that keeps what the page has seen of friction."""
     settings: DaemonFile | None = None
     """The daemon's file, and"""
     file: Path | None = None
@@ -86,23 +89,19 @@ class WatchedValve:
 
 
 def _view(place: Place) -> ValveView:
-    """Return the view of a valve, with what was kept of its friction; in the file stands the time of day.
-
-    Raises:
-        InputError: it cannot be kept.
-    """
-    if place.keep is None:
-        return ValveView(place.name, place.stroke_m, POLL_S)
-    file = FrictionFile(place.keep, place.name, FRICTION_KEPT)
-    now_s = time.time()  # rows of a clock that ran ahead would keep new ones out
+    """Return the view of a valve, with the friction of each hour of the last month that the daemon's history holds."""
+    now_s = time.time()  # hours of a clock that ran ahead would keep new rows out
     off_s = now_s - time.monotonic()
-    return ValveView(
-        place.name,
-        place.stroke_m,
-        POLL_S,
-        seen=[(row[0] - off_s, *row[1:]) for row in file.rows if row[0] <= now_s],
-        keep=lambda row: file.append((row[0] + off_s, *row[1:])),
-    )
+    hours: list[tuple[int, HealthHour]] = []
+    if place.history is not None:
+        with suppress(InputError), HistoryReader(place.history) as history:
+            hours = history.rows(HealthHour, place.name, limit=FRICTION_KEPT_HOURS)
+    seen = [
+        (hour.hour_s - off_s, hour.friction_pa, hour.friction_baseline_pa)
+        for _, hour in hours
+        if hour.hour_s <= now_s and isfinite(hour.friction_pa)
+    ]
+    return ValveView(place.name, place.stroke_m, POLL_S, seen=seen)
 
 
 @contextmanager
@@ -110,7 +109,7 @@ def watching(places: Sequence[Place]) -> Iterator[list[WatchedValve]]:
     """Poll these valves as long as the context lasts.
 
     Raises:
-        InputError: a file of a certificate that is not there or does not fit; friction that cannot be kept.
+        InputError: a file of a certificate that is not there or does not fit.
     """
     for place in places:
         for role in (Role.OBSERVER, *place.tls_of):

@@ -11,7 +11,7 @@ Its files:
     marks                   how things are stressed: grey, NE 107, a fault
     trend_plot              reference, position and pressure as they come, the states as bands
     recorded_plot           the last minutes as recorded, to zoom into
-    friction_plot           friction against its baseline, a row a minute
+    friction_plot           friction against its baseline
     controls                signing in; mode, reference, pressure, identification, acknowledgement
     signed_in               which role is in front of a tab
     alarm_card              the alarms: seen, shelved

@@ -2,7 +2,6 @@
 
 import argparse
 from collections.abc import Iterator
-from dataclasses import replace
 from pathlib import Path
 from typing import TYPE_CHECKING
 
@@ -33,7 +32,6 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
     parser.add_argument(
         "--set-password", choices=("operator", "engineer"), help="ask for this role's password, keep it in --roles, end"
     )
-    parser.add_argument("--keep", type=Path, metavar="FOLDER", help="keep the trend of friction over restarts")
     add_listening(parser)
     parser.add_argument(
         "--password-file",
@@ -52,7 +50,7 @@ def run(arguments: argparse.Namespace) -> int:
 
     if arguments.set_password is not None:
         return set_role_password(arguments.roles, arguments.set_password, "--roles")
-    places = [replace(each, keep=arguments.keep) for each in _places(arguments)]
+    places = list(_places(arguments))
     sign_in = None if arguments.roles is None else SignIn(read_passwords(arguments.roles))
     where = listening(arguments)
     serve_valves(places, where, sign_in, opens_browser=not arguments.no_open)

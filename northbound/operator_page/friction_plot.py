@@ -1,4 +1,4 @@
-"""Friction against its baseline since this page looks, and before if it was kept: a row a minute, for a month."""
+"""Friction against its baseline: a row a minute since this page looks, before that an hourly row of the history."""
 
 import time
 from typing import Any

@@ -1,6 +1,9 @@
 """A valve as an observer knows it, in virtual time."""
 
 import math
+import time
+from contextlib import closing
+from pathlib import Path
 
 import numpy as np
 import pytest
@@ -10,6 +13,9 @@ from config.registers import BY_NAME, WRITER_AT
 from northbound.observer.poller import COUNTS, EACH_TIME, REST, names_of
 from northbound.observer.trends import Trend, bands
 from northbound.observer.valve_view import TREND_S, ValveView
+from northbound.observer.watched_valves import Place, WatchedValve
+from positioner.history.entries import HealthHour
+from positioner.history.history_file import HistoryFile
 
 STROKE_M = 0.1
 POLL_S = 0.05
@@ -108,6 +114,20 @@ def test_friction_is_kept_a_row_a_minute() -> None:
         polled.time_s = 60.0 * minute
         polled.poll(2.0, friction=18e3 + minute, friction_baseline=18e3)
     assert [row[1] for row in polled.view.friction] == [18e3, 18e3 + 1, 18e3 + 2]
+
+
+def test_the_friction_of_before_is_that_of_the_daemons_history(tmp_path: Path) -> None:
+    """Hours without friction, of another valve, or of a clock that ran ahead are left out; new readings follow."""
+    now_s = int(time.time())
+    hours = [(now_s - 7200, 6e3), (now_s - 3600, math.nan), (now_s - 1800, 7e3), (now_s + 9000, 8e3)]
+    with closing(HistoryFile(tmp_path, 400.0, 100)) as file:
+        for name, shift in (("FV 1", 0.0), ("FV 2", 1e3)):
+            file.append([HealthHour(name, s, 0, 0.1, 2, 0.5, 3, pa + shift, 5e3, 4, 5, 6, 7, 8) for s, pa in hours])
+    view = WatchedValve(Place("FV 1", "127.0.0.1", 1, 1, 0.1, history=tmp_path)).view
+    assert [row[1] for row in view.friction] == [6e3, 7e3]
+    view.take(time.monotonic(), {"friction": 7.1e3, "friction_baseline": 5e3})
+    assert [row[1] for row in view.friction] == [6e3, 7e3, 7.1e3]
+    assert WatchedValve(Place("FV 1", "127.0.0.1", 1, 1, 0.1, history=tmp_path / "none")).view.friction == ()
 
 
 def test_the_stroke_follows_from_the_positions_where_nobody_said_it() -> None:
