@@ -119,6 +119,10 @@ class Controller:
         seen = known(last.applied.ratios, estimates, statics, stroke_m, settings.valve)
         return memory.law.known(seen, statics)
 
+    def begin(self) -> None:
+        """Have the cycles begin: what was seen while the valve was set up is not judged by."""
+        self._memory = self._memory._replace(supervision=self._memory.supervision.begun())
+
     def step(self, sample: Sample, requests: Requests) -> Decision:
         """Decide on one sample."""
         memory, refiner = self._memory, self._refiner
@@ -644,15 +648,14 @@ def _reference(now: Now, mode: Mode, consumed: ConsumedRequests, *, waits: bool)
 def _held_pa(now: Now, state: State, supervision: SupervisionMemory, law: Law) -> float:
     """Return what to hold: the last command, for a push what follows it; over S3 the one before it.
 
-    After a fault what a device came back with, and what one shows that does not obey: it may be operated locally, and
-    shall stay where it is when it is given back.
+    After a fault, and at first, what a device is found with. After a fault also what one shows that does not obey: it
+    may be operated locally, and shall stay where it is when it is given back.
     """
     memory, sample = now.memory, now.sample
-    if supervision.fault:
-        if sample.held_pa is not None:
-            return sample.held_pa
-        if sample.quality is GOOD and sample.status & NOT_READY:
-            return sample.pressure_pa
+    if sample.held_pa is not None and (supervision.fault or memory.supervision.awaited):
+        return sample.held_pa
+    if supervision.fault and sample.quality is GOOD and sample.status & NOT_READY:
+        return sample.pressure_pa
     if state is S3 or memory.last.state is S3:
         return memory.held_pa
     return law.interrupted_pa(memory.wanted_pa)

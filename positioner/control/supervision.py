@@ -4,6 +4,9 @@ It knows nothing of the law. A fault is latched: the mode falls to hold, the saf
 acknowledgement after its cause is gone frees the way; then a person or the DCS must choose a mode again. A fault whose
 action is manual leaves the valve to an operator instead: the mode falls to manual, unless it was hold, and the pressure
 is held until they write one.
+
+A device that has not answered yet since the cycles began is not there yet. That is a fault while it lasts, and is not
+latched: nothing was commanded. What the device holds when it is found is held.
 """
 
 import math
@@ -61,9 +64,18 @@ class SupervisionMemory(NamedTuple):
     acknowledgements: int = 0
     heartbeats: int = 0
     position_m: float | None = None
-    """Of the stem at the last good measurement; None before the first since the start."""
+    """Of the stem at the last good measurement; None before the first since the cycles began."""
     unanswered_pa: tuple[float, ...] = ()
     """Commands given since the last good measurement, which the device may hold or not."""
+
+    def begun(self) -> "SupervisionMemory":
+        """Return what is known where the cycles begin: what was seen before, while the valve was set up, is too old."""
+        return self._replace(bad_in_a_row=0, lost_in_a_row=0, good_s=-math.inf, position_m=None, unanswered_pa=())
+
+    @property
+    def awaited(self) -> bool:
+        """Whether the device has not given one good measurement yet: it is not there yet, and nothing was told it."""
+        return self.position_m is None
 
     def failed(self, limits: Limits) -> "SupervisionMemory":
         """Return what is known where the daemon itself has failed: what was to be commanded is not finite."""
@@ -117,14 +129,17 @@ def supervise(
     given_pa = (*memory.unanswered_pa, command_pa) if short else (command_pa,)
 
     unheard = lost_in_a_row >= limits.lost_after_cycles
-    cause = _cause(sample, given_pa, bad_in_a_row, now_s - good_s, limits, unheard=unheard) or monitored
+    given_pa = (sample.held_pa,) if memory.awaited and sample.held_pa is not None else given_pa
+    cause = _cause(sample, given_pa, bad_in_a_row, now_s - good_s, limits, unheard=unheard)
+    cause = cause or monitored
     # Who chooses a mode meanwhile gets it for no cycle: one would be a command, and the fault would hold that.
     commanding = memory.mode is not HOLD or (requests.mode_writes != memory.mode_writes and requests.mode is not HOLD)
     silent = 0 < limits.heartbeat_timeout_s < now_s - heartbeat_s and commanding
     if silent and not cause:
         cause = Fault.DCS_SILENT
+    not_there_yet = memory.awaited and memory.fault is Fault.NO_REPLY
     acknowledged = requests.acknowledgements != memory.acknowledgements
-    fault = cause or (NO_FAULT if acknowledged else memory.fault)
+    fault = cause or (NO_FAULT if acknowledged or not_there_yet else memory.fault)
     return supervision_of(
         mode=_mode(memory, requests, fault, limits),
         fault=fault,

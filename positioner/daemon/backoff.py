@@ -22,6 +22,10 @@ MOST_DOUBLINGS = 30
 """Failures beyond are not counted: every wait is the longest by then."""
 MAKE_UP = 2
 """Successes that make up for a failure: a line that loses a reply now and then is no device that is away."""
+AT_A_TIME = 4
+"""Devices that one process connects to at a time; the others' turn comes with a later cycle. Many valves that begin, or
+are back, together ask some ten things each: a gateway that answers one after another is later than its time-out, and is
+asked anew."""
 
 
 class Backoff:

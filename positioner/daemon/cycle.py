@@ -63,6 +63,7 @@ class Cycle:
         with logging_valve(self._valve):
             self._pace.prepare()
             self.link.begin()
+            self._controller.begin()
 
     def turn(self) -> None:
         """Wait until the next cycle is due and run it."""

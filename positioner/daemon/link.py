@@ -19,6 +19,7 @@ import logging
 import math
 import time
 from dataclasses import dataclass
+from threading import Semaphore
 
 from config.codes import GOOD, LOST, NO_NUMBER, REPEATED
 from config.daemon_file import DaemonFile
@@ -108,9 +109,12 @@ class Link:
         driver: of the device.
         pace: says what time it is.
         settings: how the device is attended to.
+        door: of all that connect anew; who finds it closed tries with the next cycle. None: nobody else does.
     """
 
-    def __init__(self, driver: Driver, pace: Pace, settings: LinkSettings | None = None) -> None:
+    def __init__(
+        self, driver: Driver, pace: Pace, settings: LinkSettings | None = None, door: Semaphore | None = None
+    ) -> None:
         self.counts = LinkCounts()
         self._driver = driver
         # Asking what a driver can do takes a tenth of a cycle.
@@ -118,6 +122,7 @@ class Link:
         self._keeps_settings = driver if isinstance(driver, KeepsSettings) else None
         self._pace = pace
         self._settings = settings or LinkSettings()
+        self._door = door or Semaphore()
         self._longest_unattended_s = self._settings.longest_unattended_s
         self._read_back_s = -math.inf
         self._read_backs = 0
@@ -194,8 +199,11 @@ class Link:
                 else:
                     self._sample = self._fresh(reading, command_pa, told_pa)
                     self._told_pa = command_pa
-            elif self._unattended_s > 0 or self._backoff.may_try(now_s):
-                self._sample = self._found_again()
+            elif (self._unattended_s > 0 or self._backoff.may_try(now_s)) and self._door.acquire(blocking=False):
+                try:
+                    self._sample = self._found_again()
+                finally:
+                    self._door.release()
             else:
                 self._sample = self._lost()
         except DriverError as error:

@@ -105,7 +105,26 @@ def test_an_unfit_device_is_a_fault_at_once(status: DeviceStatus) -> None:
 
 @pytest.mark.parametrize(("held_pa", "fault"), [(50e3, Fault.NONE), (50.3e3, Fault.NONE), (0.0, Fault.RESTARTED)])
 def test_a_device_that_comes_back_with_another_command_was_restarted(held_pa: float, fault: Fault) -> None:
-    assert faults(watched([good(0.0)._replace(held_pa=held_pa)], AUTOMATIC)) == [fault]
+    assert faults(watched([good(0.0), good(0.01)._replace(held_pa=held_pa)], AUTOMATIC)) == [Fault.NONE, fault]
+
+
+def test_a_device_that_has_not_answered_yet_is_a_fault_while_that_lasts_and_leaves_none_behind() -> None:
+    """It is found with another command than was assumed: nobody has given it one."""
+    silent = [good(0.0)._replace(now_s=0.04 * n, quality=Quality.LOST) for n in range(5)]
+    found = good(0.2)._replace(held_pa=0.0)
+    watches = watched([*silent, found, *[each._replace(now_s=each.now_s + 0.24) for each in silent]], AUTOMATIC)
+    assert faults(watches)[2:6] == [Fault.NO_REPLY] * 3 + [Fault.NONE]
+    assert watches[5].mode is Mode.HOLD, "whoever chose a mode meanwhile chooses it again"
+    assert faults(watched([good(0.5)], AUTOMATIC, watches[-1])) == [Fault.NO_REPLY], "from then on silence is latched"
+
+
+def test_what_was_seen_in_the_set_up_is_no_measurement_of_the_cycles() -> None:
+    """The set-up took ten seconds, and the device waits for its turn to be found."""
+    (set_up,) = watched([good(0.0)], Requests())
+    waits = [good(0.0)._replace(now_s=10.0 + 0.03 * n, quality=Quality.LOST) for n in range(4)]
+    found = good(10.2)._replace(held_pa=0.0)
+    watches = watched([*waits, found], Requests(), set_up.begun())
+    assert faults(watches) == [Fault.NONE, Fault.NONE, Fault.NO_REPLY, Fault.NO_REPLY, Fault.NONE]
 
 
 def test_a_daemon_that_stood_still_is_a_fault_whatever_the_device_says() -> None:

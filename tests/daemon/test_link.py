@@ -1,6 +1,7 @@
 """The link: what becomes of readings and of their absence."""
 
 from dataclasses import replace
+from threading import Event, Semaphore, Thread
 
 import numpy as np
 import pytest
@@ -245,6 +246,38 @@ def test_a_daemon_that_stood_still_before_its_first_cycle_says_so(monkeypatch: p
     link.begin()
     clock.now_s += 0.6
     assert link.exchange(5e4).unattended_s == pytest.approx(0.6)
+
+
+class Waiting(Scripted):
+    """A driver that connects when it is let."""
+
+    def __init__(self, *answers: Reading | DriverError) -> None:
+        super().__init__(*answers)
+        self.asked, self.let = Event(), Event()
+
+    def open(self) -> float:
+        self.asked.set()
+        assert self.let.wait(60.0)
+        return super().open()
+
+
+def test_so_many_connect_at_a_time_and_the_others_with_a_later_cycle() -> None:
+    door = Semaphore(2)
+    drivers = [Waiting(reading(1)) for _ in range(5)]
+    links = [Link(driver, DevicePace(), door=door) for driver in drivers]
+    first = [Thread(target=link.exchange, args=(5e4,)) for link in links[:2]]
+    for thread, driver in zip(first, drivers, strict=False):
+        thread.start()
+        assert driver.asked.wait(60.0)
+    for driver in drivers[2:]:
+        driver.let.set()
+    assert [link.exchange(5e4).quality for link in links[2:]] == [Quality.LOST] * 3
+    for driver in drivers[:2]:
+        driver.let.set()
+    for thread in first:
+        thread.join()
+    assert [link.exchange(5e4).quality for link in links[2:]] == [Quality.GOOD] * 3
+    assert [driver.opened for driver in drivers] == [1] * 5
 
 
 def test_a_stall_is_told_even_where_the_device_is_found_only_later(monkeypatch: pytest.MonkeyPatch) -> None:
