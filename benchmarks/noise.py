@@ -12,8 +12,8 @@ from collections.abc import Iterator, Sequence
 
 import numpy as np
 
-from config.noise import Array, position_noise_m
 from config.valve_file import ValveFile, ValveParameters, load_valve, shipped_valve
+from signals.noise import Array, position_noise_m
 from sim.composition import Composition
 from sim.open_loop import respond
 

@@ -35,9 +35,9 @@ from benchmarks.kept_lines import Line, kept, run
 from config.errors import InputError
 from config.recording import Column, Recording
 from config.valve_file import ValveFile, ValveParameters
+from signals.moves import slips
 from sim.effect import first_effects
 from workbench.blind.hiding import drawn_effects, hide
-from workbench.data.motion import slips
 from workbench.data.record import ready
 from workbench.data.stretches import informative
 from workbench.fit.fitting import base_fit, fit

@@ -22,7 +22,7 @@ Its files:
     quantities, modbus_map, register_format       what a device measures and obeys; its registers; values in words
     registers, codes, roles                       the supervisory table; every code and its text; who may write
     passwords, role_passwords                     passwords as they are kept; the file with those of the roles
-    recording, noise, plausibility                the recording format; a position's noise; what is odd about either
+    recording, plausibility                       the recording format; what is odd about a recording
     recorder_files                                the files of a daemon's recorder, by their names
     results                                       what results have in common in a notebook
     arguments                                     what the library's functions are given: other kinds are refused

@@ -3,5 +3,6 @@
 Its files:
 
     independence    how many of neighbouring samples are independent
-    moves           rests and moves of a stem, each move from its onset to its last sample in motion
+    moves           rests, moves and slips of a stem, each move from its onset to its last sample in motion
+    noise           the noise of a position and its quantum; readings that stand still
 """

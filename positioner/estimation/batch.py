@@ -45,7 +45,6 @@ from operator import or_
 import numpy as np
 
 from config.codes import Refusal, Sampling
-from config.noise import position_noise_m
 from config.results.result import Brief
 from positioner.estimation.array import Array
 from positioner.estimation.breakaway_force import from_interval, intersection, with_validity
@@ -56,6 +55,7 @@ from positioner.estimation.motion_preparation import CLEAR, Beside
 from positioner.estimation.motion_segment import MotionSegment
 from positioner.estimation.record_consistency import contradicts
 from positioner.estimation.segmentation import Segmentation, find_motions, whole_stretch
+from signals.noise import position_noise_m
 
 MOST_STRETCHES = 8
 """The farthest motions of a record are fitted together; more add little and cost much."""

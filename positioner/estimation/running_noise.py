@@ -1,6 +1,6 @@
 """White noise of the position, measured block by block while the stem does whatever it does.
 
-The mathematics is that of the record's estimator (`config.noise`): the median of |third difference| over each block,
+The mathematics is that of the record's estimator (`signals.noise`): the median of |third difference| over each block,
 the median over the blocks. Here the blocks come one after another, each a window of the running record, and there are
 never all samples at once.
 """
@@ -9,8 +9,8 @@ from statistics import median
 
 import numpy as np
 
-from config.noise import noise_by_median
 from positioner.estimation.array import Array
+from signals.noise import noise_by_median
 
 
 class PositionNoise:

@@ -14,7 +14,6 @@ from numpy.typing import NDArray
 
 from config.arguments import kinds_held
 from config.drive import Scale
-from config.noise import quantum_m
 from config.plausibility import odd_sizes
 from config.recording import Column, Recording
 from positioner.response.dead_band import dead_band_and_resolution
@@ -22,6 +21,7 @@ from positioner.response.figure import Figure, undetermined
 from positioner.response.response_result import ResponseFigures
 from positioner.response.step_detection import StepChange, find_steps
 from positioner.response.step_figures import FIGURES, StepFigures, figures_of
+from signals.noise import quantum_m
 
 EXCITED = 3
 """The state column's number for S3."""

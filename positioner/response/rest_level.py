@@ -5,7 +5,7 @@
             quantum / sqrt 12)                                                          rounding
 
 Medians, so that a few wild samples change nothing. A level is a median over n samples, of standard deviation
-1.2533 σ / sqrt n. Not the third differences of `config.noise`: a rest may have five samples and holds no motion, and
+1.2533 σ / sqrt n. Not the third differences of `signals.noise`: a rest may have five samples and holds no motion, and
 what drifts slowly there widens a level as noise does.
 """
 

@@ -23,7 +23,6 @@ import numpy as np
 
 from config.codes import ValveTestVerdict
 from config.drive import Kind, as_written
-from config.noise import quantum_m
 from config.recording import Column, Recording
 from config.travel import ActionWord
 from positioner.response.figure import Figure, undetermined
@@ -32,6 +31,7 @@ from positioner.tests_on_the_valve.air_rates import air_rates
 from positioner.tests_on_the_valve.outcome import Outcome, Quantity
 from positioner.tests_on_the_valve.program import Bounds, Leap, Played, Player, Program, ramped
 from positioner.tests_on_the_valve.thresholds import THRESHOLDS
+from signals.noise import quantum_m
 
 TEST = "commissioning"
 ANGLE_DIGITS = 3

@@ -3,12 +3,12 @@
 import numpy as np
 import pytest
 
-from signals.moves import moves, moving
+from signals.moves import directions, legs, moves, moving, rests_first, slips
 
 NOISE_M = 5e-5
 
 
-def slips(generator: np.random.Generator, count: int = 4000) -> tuple[np.ndarray, list[int]]:
+def slipping(generator: np.random.Generator, count: int = 4000) -> tuple[np.ndarray, list[int]]:
     """Return positions of a stem that slips now and then, each time within three samples, and when it leaves."""
     at = np.sort(generator.choice(np.arange(100, count - 100, 40), 12, replace=False))
     x_m = np.full(count, 0.03)
@@ -20,7 +20,7 @@ def slips(generator: np.random.Generator, count: int = 4000) -> tuple[np.ndarray
 
 @pytest.mark.parametrize("seed", range(8))
 def test_each_slip_is_a_move_that_begins_where_the_stem_leaves(seed: int) -> None:
-    x_m, at = slips(np.random.default_rng(seed))
+    x_m, at = slipping(np.random.default_rng(seed))
     found = moves(x_m, NOISE_M)
     assert len(found) == len(at)
     for move, left in zip(found, at, strict=True):
@@ -81,3 +81,35 @@ def test_noise_in_a_rest_is_not_the_end_of_the_slide_before_it() -> None:
     assert moving(x_m, NOISE_M)[880:920].any(), "the bump is seen"
     (move,) = moves(x_m, NOISE_M)
     assert abs(move.after - 500) <= 3
+
+
+def test_a_slip_goes_one_way_and_what_turns_without_a_rest_is_two() -> None:
+    there = np.concatenate([np.zeros(100), np.linspace(0.0, 400.0, 50), np.linspace(400.0, 0.0, 50), np.zeros(100)])
+    x_m = (there + np.random.default_rng(6).standard_normal(there.size)) * NOISE_M
+    assert len(moves(x_m, NOISE_M)) == 1, "it comes back to where it was, and has moved"
+    up, down = slips(x_m, NOISE_M)
+    assert (up.direction, down.direction) == (1, -1)
+    assert abs(up.last - 149) <= 1
+    assert up.travel_m == pytest.approx(down.travel_m, abs=5.0 * NOISE_M)
+    way = directions(x_m, NOISE_M)
+    assert not way[:98].any()
+    assert (way[103:148] == 1).all()
+    assert (way[152:197] == -1).all()
+    assert not way[203:].any()
+
+
+def test_a_leg_begins_where_the_stem_sets_out_and_not_in_the_dwell_before() -> None:
+    x = np.concatenate([np.linspace(0.0, 1.0, 50), np.ones(30), np.linspace(1.0, 0.0, 50)])
+    assert [(begin, end, way) for begin, end, way in legs(x, 0.1)] == [(0, 49, 1), (80, 129, -1)]
+    assert legs(0.05 * x, 0.1) == []
+
+
+def test_a_record_first_rests_where_its_first_motion_ends_unless_its_command_began_that() -> None:
+    x_m = np.concatenate([np.zeros(30), np.linspace(0.0, 300.0, 60), np.full(100, 300.0)]) * NOISE_M
+    x_m += NOISE_M * np.random.default_rng(7).standard_normal(x_m.size)
+    assert rests_first(x_m, NOISE_M) == 0
+    assert rests_first(x_m, NOISE_M, held=30) == 0, "it moves as its command changes"
+    assert abs((rests_first(x_m, NOISE_M, held=60) or 0) - 90) <= 3, "it moved before"
+    curved_m = np.concatenate([np.cumsum(np.arange(60.0)[::-1]), np.full(100, 1770.0)]) * NOISE_M
+    assert rests_first(curved_m, NOISE_M) is not None
+    assert rests_first(np.cumsum(10.0 * np.arange(60.0) ** 2) * NOISE_M, NOISE_M) is None, "it never rests"

@@ -8,13 +8,13 @@ import pytest
 from scipy.integrate import solve_ivp
 
 from config.valve_file import EffectTable, ValveFile, ValveParameters
+from signals.moves import slips
 from sim.composition import Composition
 from sim.effect import shipped_effects
 from sim.open_loop import at_rest, follow
 from tests.workbench.generators import CASES, CLEAN, DIRTY, KINDS, LAWS, SMOOTH, Plant, Series, case
 from tests.workbench.generators import follow as followed
 from workbench.blind.input_signal import excitation
-from workbench.data.motion import slips
 from workbench.data.noise_floor import repeatability_m
 
 pytestmark = pytest.mark.long

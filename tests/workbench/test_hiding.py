@@ -16,6 +16,7 @@ from config.errors import InputError
 from config.recording import read_recording
 from config.valve_file import ValveFile, find_valve, load_valve
 from positioner.cli.main import main
+from signals.moves import slips
 from sim.composition import Composition
 from sim.effect import first_effects, shipped_effect, shipped_effects, tried_effects
 from tests.workbench.valves import error_of
@@ -24,7 +25,6 @@ from workbench.blind.hiding import Hidden, drawn_effects, drawn_valve, hide, kno
 from workbench.blind.input_signal import FIRST_PASSAGE_SHARE, excitation
 from workbench.blind.sealing import FILES, SEALED, seal
 from workbench.blind.trial import NOISE_M
-from workbench.data.motion import slips
 from workbench.data.noise_floor import repeat_lag, repeatability_m
 
 Capture = pytest.CaptureFixture[str]

@@ -4,13 +4,13 @@ import numpy as np
 import pytest
 
 from config.errors import InputError
-from config.noise import quantum_m
 from config.recording import Column, Recording
 from config.valve_file import EffectTable
+from signals.moves import AT_ONCE
+from signals.noise import quantum_m
 from sim.composition import Composition
 from sim.open_loop import respond
 from tests.workbench.valves import NOISE_M, SEED, drawn_valve, record_of
-from workbench.data.motion import AT_ONCE
 from workbench.data.noise_floor import UNKNOWN, noise_std_m, repeatability_m
 from workbench.data.record import ready, require_units
 

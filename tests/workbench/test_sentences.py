@@ -6,9 +6,9 @@ import numpy as np
 import pytest
 
 from config.drive import VALVE
+from signals.moves import Slip
 from workbench.compare.comparison_sentences import Findings, judged, sentences, shortened, slip_sentences
 from workbench.compare.slip_matching import MatchedSlip, SlipEvents
-from workbench.data.motion import Slip
 
 SLIPS = tuple(Slip(i, i + 1, 0.0, 1e-3 * (-1) ** i, (-1) ** i) for i in range(25))
 FOUND = Findings(

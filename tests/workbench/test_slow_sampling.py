@@ -7,9 +7,9 @@ import numpy as np
 import pytest
 
 from config.errors import InputError
-from config.noise import position_noise_m
 from config.recording import Column, Recording, write_recording
 from positioner.cli.main import main
+from signals.noise import position_noise_m
 from sim.composition import Composition
 from sim.open_loop import respond
 from tests.workbench.slow_records import once_a_second

@@ -5,11 +5,11 @@ import pytest
 
 from config.errors import InputError
 from config.recording import Recording
+from signals.moves import rests
 from sim.composition import Composition
 from tests.workbench.slow_records import SPAN_PA, once_a_second
 from tests.workbench.valves import NOISE_M, SEED, with_effect
 from workbench.data.noise_floor import with_noise
-from workbench.data.plateaus import plateaus
 from workbench.data.record import ready
 from workbench.data.stillness import eventful
 from workbench.fit.fitting import fit
@@ -78,20 +78,20 @@ def test_fast_sampling_is_simulated_with_inertia() -> None:
     assert sampling(ready(with_noise(fast, NOISE_M)), SEED.valve).motion is Motion.DYNAMIC
 
 
-def test_a_plateau_knows_where_its_slide_came_from() -> None:
+def test_a_rest_knows_where_its_slide_came_from() -> None:
     x = np.repeat([1.0, 2.0, 1.5, 1.6, 1.5], [4, 3, 3, 1, 5])
-    assert [(each.first, each.end, each.direction) for each in plateaus(x, 1e-3)] == [
+    assert [(each.first, each.end, each.direction) for each in rests(x, 1e-3)] == [
         (0, 4, 0), (4, 7, 1), (7, 10, -1), (11, 16, -1)
     ]  # fmt: skip
-    assert not plateaus(np.linspace(0.0, 1.0, 300), 1e-3), "it creeps"
+    assert not rests(np.linspace(0.0, 1.0, 300), 1e-3), "it creeps"
     cut = np.array([0.0, 1e-3, 0.0, -3e-3, 3e-3, 0.0, 1e-3, 0.0])
-    assert [each[:2] for each in plateaus(cut, 1e-3)] == [(0, 8)], "two samples of noise make no slide"
+    assert [each[:2] for each in rests(cut, 1e-3)] == [(0, 8)], "two samples of noise make no slide"
     stray = np.repeat([0.0, 1e-3, -4.5e-3, 1e-3, 0.0], [5, 1, 1, 1, 5])
-    assert [each[:2] for each in plateaus(stray, 1e-3)] == [(0, 13)], "nor does one that is far from both beside it"
+    assert [each[:2] for each in rests(stray, 1e-3)] == [(0, 13)], "nor does one that is far from both beside it"
     early = np.repeat([1.0, 0.0, 4e-3, -2e-3, 0.0], [4, 1, 1, 1, 5])
-    assert [(each.first, each.direction) for each in plateaus(early, 1e-3)] == [(0, 0), (4, -1)], "nor soon after one"
+    assert [(each.first, each.direction) for each in rests(early, 1e-3)] == [(0, 0), (4, -1)], "nor soon after one"
     short = np.repeat([0.0, 1e-2], [1000, 12])
-    assert [each[:2] for each in plateaus(short, 1e-3)] == [(0, 1000), (1000, 1012)], "one of its own beside a long one"
+    assert [each[:2] for each in rests(short, 1e-3)] == [(0, 1000), (1000, 1012)], "one of its own beside a long one"
 
 
 def test_a_landing_under_a_moving_pressure_is_not_settled() -> None:

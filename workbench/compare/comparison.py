@@ -18,6 +18,7 @@ from config.recording import Column, Recording
 from config.results.block import Block, Table
 from config.results.result import Result
 from config.valve_file import ValveFile
+from signals.moves import Slip, slips
 from sim.composition import Composition
 from workbench.compare.comparison_sentences import Findings, Stretch, judged, shortened
 from workbench.compare.friction_balance import Forces, FrictionBalance, balance, forces
@@ -33,7 +34,7 @@ from workbench.compare.residuals import (
     spectrum,
 )
 from workbench.compare.slip_matching import SlipEvents, matched
-from workbench.data.motion import Slip, slips, velocity_m_per_s
+from workbench.data.motion import velocity_m_per_s
 from workbench.data.noise_floor import told
 from workbench.data.record import Record, ready, require_units
 from workbench.model.free_run import FreeRun, Run
@@ -321,7 +322,7 @@ def _segment_findings(valve: ValveFile, record: Record, run: Run, first: int, en
     return _SegmentFindings(
         measured,
         matched(time_s - record.time_s[0], (measured, measured_m), (simulated, simulated_m), record.scale_m),
-        phases(measured_m, record.scale_m, measured, valve),
+        phases(measured_m, measured, valve),
         direction,
         velocity_m_per_s(time_s, measured_m),
         both[0],

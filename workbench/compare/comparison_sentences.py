@@ -13,10 +13,10 @@ from numpy.typing import NDArray
 
 from config.drive import Scale
 from config.recording import Column
+from signals.moves import Slip
 from workbench.compare.measures import BLOCK_S
 from workbench.compare.phases import PHASES
 from workbench.compare.slip_matching import MatchedSlip, SlipEvents
-from workbench.data.motion import Slip
 from workbench.data.noise_floor import UNKNOWN
 
 CERTAIN = 3.5

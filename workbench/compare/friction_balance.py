@@ -12,8 +12,9 @@ import numpy as np
 from config.recording import Column
 from config.results.result import Brief
 from config.valve_file import ValveParameters
+from signals.moves import directions
 from workbench.compare.residuals import Profile, profile
-from workbench.data.motion import PARABOLA, acceleration_m_per_s2, directions, velocity_m_per_s
+from workbench.data.motion import PARABOLA, acceleration_m_per_s2, velocity_m_per_s
 
 
 @dataclass(frozen=True, slots=True, repr=False)

@@ -12,7 +12,7 @@ from numpy.typing import NDArray
 
 from config.recording import Column
 from config.valve_file import ValveFile
-from workbench.data.motion import Slip, directions
+from signals.moves import Slip
 
 PHASES = ("stuck", "slipping up", "slipping down", "reversal", "near stops")
 STUCK, UP, DOWN, REVERSAL, NEAR_STOPS = range(len(PHASES))
@@ -20,10 +20,11 @@ NEAR_STOP_STROKE_SHARE = 0.02
 """Of the stroke: nearer to a stop the stem is near it."""
 
 
-def phases(position_m: Column, noise_m: float, found: Sequence[Slip], valve: ValveFile) -> NDArray[np.int64]:
+def phases(position_m: Column, found: Sequence[Slip], valve: ValveFile) -> NDArray[np.int64]:
     """Return the phase of each sample of an unbroken stretch, an index into PHASES, (n,) as the positions, m."""
-    way = directions(position_m, noise_m)
-    phase = np.select([way > 0, way < 0], [UP, DOWN], STUCK).astype(np.int64)
+    phase = np.full(position_m.size, STUCK, np.int64)
+    for each in found:
+        phase[each.first + 1 : each.last + 1] = UP if each.direction > 0 else DOWN
     for i, slip in enumerate(found):
         if i and slip.direction != found[i - 1].direction:
             phase[slip.first : found[i + 1].first if i + 1 < len(found) else None] = REVERSAL

@@ -13,7 +13,7 @@ import numpy as np
 
 from config.recording import Column
 from config.results.result import Brief
-from workbench.data.motion import REACH, Slip
+from signals.moves import Slip
 
 WITHIN = 0.4
 """Of the median time between slips: a match goes on within it."""
@@ -58,7 +58,7 @@ def matched(
     for i, slip in enumerate(ours):
         partner = _nearest(time_s, slip, theirs, within_s)
         if partner is not None and _nearest(time_s, partner, ours, within_s) is slip:
-            row = min(max(slip.last, partner.last) + REACH, time_s.size - 1)
+            row = min(max(slip.last, partner.last), time_s.size - 1)
             pairs.append(
                 MatchedSlip(
                     float(time_s[slip.first]),

@@ -7,8 +7,7 @@ Its files:
     clocks            whether the stem moves before its command
     noise_floor       what no model explains: noise, rounding, how well the valve repeats itself
     pressure_lag      the lag of a measured pressure, and what it was where it was not measured
-    motion            velocity, and the slips
-    plateaus          where the stem rests, of few samples a move
+    motion            velocity and acceleration
     stillness         which rows tell something, and which only say it again
     stretches         of a long one, those that tell the most
     imposed_motion    a bench where a rig imposes the position, and static curves

@@ -16,9 +16,8 @@ import numpy as np
 import numpy.typing as npt
 
 from config.recording import Column
+from signals.moves import slips
 
-MOVED = 6.0
-"""Noises by which a stem moves from one sample to the next."""
 HELD = 3
 """Samples for which a command is held before it turns: those of a loop that is faster than they are show any order."""
 FEWEST_TURNS = 6
@@ -77,16 +76,16 @@ def early(
 
 def _turns(command: Column, position_m: Column, scale_m: float) -> tuple[int, Rows]:
     """Return how many turns of a segment tell, and by how many samples the stem makes them first, (those,)."""
-    steps_m = np.diff(position_m)
-    moved = np.abs(steps_m) > MOVED * scale_m
-    leaves = 1 + np.flatnonzero(moved & ~np.append(False, moved[:-1]))
+    found = slips(position_m, scale_m)
+    leaves = np.array([each.first + 1 for each in found], dtype=np.int64)
+    ways = np.array([each.direction for each in found], dtype=np.int64)
     changes = 1 + np.flatnonzero(np.diff(command))
     way = np.sign(np.diff(command)[changes - 1])
     following = np.searchsorted(changes, leaves, side="right")
     known = (following >= 2) & (following < changes.size)
-    leaves, following = leaves[known], following[known]
+    leaves, ways, following = leaves[known], ways[known], following[known]
     turn = (way[following - 1] == way[following - 2]) & (way[following] != way[following - 1])
     turn &= changes[following] - changes[following - 1] >= HELD
     leaves, following = leaves[turn], following[turn]
-    first = np.sign(steps_m[leaves - 1]) == way[following]
+    first = ways[turn] == way[following]
     return leaves.size, (changes[following] - leaves)[first]

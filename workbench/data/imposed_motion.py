@@ -7,8 +7,7 @@ Signs are the recording's: the position and the load positive in the opening dir
 negative, the position was counted the other way: it is turned, and told.
 
     v    from local parabolas over nine samples
-    d    direction of motion, +1 opening, -1 closing: it turns where the stem sets out to come back by more than 6
-         standard deviations of the smoothed noise, and stays while the stem rests
+    d    direction of motion, +1 opening, -1 closing (`signals.moves.legs`); it stays while the stem rests
 
 Rows before the first motion, and readings within 5 % of the curve's ends, where a seat or a stop begins to carry, are
 left out. A stroke is what lies between two reversals; errors hang together within it.
@@ -23,10 +22,11 @@ from numpy.typing import NDArray
 
 from config.arguments import kinds_held
 from config.errors import InputError
-from config.noise import position_noise_m
 from config.recording import Column, Recording, lines_of, read_table
 from config.results.result import Brief
 from config.valve_file import ValveParameters
+from signals.moves import legs
+from signals.noise import position_noise_m
 from workbench.data.motion import PARABOLA, acceleration_m_per_s2
 from workbench.data.record import UNITS_PA, UNSEEN
 
@@ -34,10 +34,9 @@ FORCES = ("time_s", "pressure_pa", "position_m", "load_n")
 CURVE = ("branch", "pressure_pa", "position_m")
 BRANCHES = {"rising": 1.0, "falling": -1.0}
 TURNED = 6.0
+"""Standard deviations of what is smoothed by which a stroke turns back;"""
 SMOOTHED = (59.0 / 231.0) ** 0.5
-"""Standard deviation that smoothing by parabolas over nine samples leaves of noise of 1."""
-LEAST_MOTION = 10.0
-"""Standard deviations of the noise that a stem moves at least; without noise, 1e-6 of the stroke."""
+"""of noise of 1, after smoothing by parabolas over nine samples."""
 NEAR_ENDS = 0.05
 BALANCE_ROWS = 12
 """Rows that a balance needs."""
@@ -218,16 +217,15 @@ def _moved(recording: Recording, valve: ValveParameters) -> Rows:
     velocity = np.gradient(smooth_m, time_s)
     period_s = float(np.median(np.diff(time_s)))
     inertia_n = valve.mass_kg * acceleration_m_per_s2(position_m, period_s)
-    if np.ptp(position_m) <= max(LEAST_MOTION * noise_m, 1e-6 * valve.stroke_m):
+    strokes = legs(smooth_m, TURNED * SMOOTHED * noise_m)
+    if not strokes or np.ptp(position_m) <= 1e-6 * valve.stroke_m:
         raise InputError("recording", "the stem does not move: there is no friction to balance")
-    direction = _directions(smooth_m, TURNED * SMOOTHED * noise_m)
-    first = int((direction != 0.0).argmax())
-    direction = direction[first:]
-    stroke = np.concatenate([[0], np.cumsum(np.diff(direction) != 0)])
+    first, begins = strokes[0][0] + 1, [begin for begin, _, _ in strokes[1:]]
+    stroke = np.searchsorted(begins, np.arange(first, position_m.size))
     return Rows(
         smooth_m[first:],
         pressure_pa[first:],
-        direction,
+        np.array([way for _, _, way in strokes], dtype=np.float64)[stroke],
         (load_n - inertia_n)[first:],
         time_s[first:] - time_s[first],
         velocity[first:],
@@ -235,24 +233,6 @@ def _moved(recording: Recording, valve: ValveParameters) -> Rows:
         np.zeros(stroke.size, np.int64),
         tuple(notes),
     )
-
-
-def _directions(position_m: Column, band_m: float) -> Column:
-    """Return +1 or -1; 0 before the first motion."""
-    direction = np.zeros(position_m.size)
-    places = position_m.tolist()
-    way, lowest, highest = 0.0, places[0], places[0]
-    for i, place in enumerate(places):
-        lowest, highest = min(lowest, place), max(highest, place)
-        opens = way <= 0.0 and place - lowest > band_m
-        if opens or (way >= 0.0 and highest - place > band_m):
-            way = 1.0 if opens else -1.0
-            lowest = highest = place
-            begun = i
-            while begun > 0 and way * (places[begun] - places[begun - 1]) > 0.0:
-                begun -= 1
-            direction[begun + 1 :] = way
-    return direction
 
 
 def _require_columns(recording: Recording, names: tuple[str, ...]) -> None:

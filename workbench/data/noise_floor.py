@@ -1,6 +1,6 @@
 """What no model can explain: the sensor's noise, its rounding, and how well the valve repeats itself.
 
-The noise is found at rest (`config.noise`), never in motion. A record whose command repeats after a lag L shows the
+The noise is found at rest (`signals.noise`), never in motion. A record whose command repeats after a lag L shows the
 position twice: repeatability = rms(x(t + L) - x(t)) / sqrt 2; and where nothing rests, what rests in the difference of
 the two tells the noise. What repeats is no noise, but for the last rounding, q: noise^2 <= repeatability^2 + q^2 / 12.
 
@@ -22,9 +22,9 @@ import numpy as np
 
 from config.drive import Scale
 from config.errors import InputError
-from config.noise import position_noise_m
 from config.recording import Column, Recording
-from workbench.data.motion import directions
+from signals.moves import directions
+from signals.noise import position_noise_m
 
 NOISE = "noise_m"
 """Key under which a recording says its noise."""

@@ -17,13 +17,13 @@ import numpy.typing as npt
 
 from config.drive import KINDS, VALVE, KindName
 from config.errors import InputError
-from config.noise import frozen, held_back_m, quantum_m
 from config.plausibility import in_each_others_place
 from config.recording import BEHIND_POSITIONER, REQUIRED, Column, Recording
 from config.results.result import Brief
 from config.valve_file import ValveParameters
+from signals.moves import AT_ONCE, rests_first, slips
+from signals.noise import frozen, held_back_m, quantum_m
 from workbench.data.clocks import Early, early
-from workbench.data.motion import AT_ONCE, rests_first, slips
 from workbench.data.noise_floor import UNKNOWN, noise_std_m, not_repeating_m, repeatability_m, said_noise_m
 from workbench.data.pressure_lag import without_gaps_pa
 

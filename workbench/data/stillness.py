@@ -8,12 +8,11 @@ before a change is kept too. A command held over the rows left out is the same a
 import numpy as np
 
 from config.recording import Column
+from signals.moves import moving
 from workbench.data.record import Mask, Record
 
 FIRST_ROWS_KEPT, LONGER = 10, 1.2
 """Rows kept after each event, and the ratio of the ages of those kept later."""
-STANDS_STILL = 5.0
-"""Noises by which samples at rest differ at most."""
 MOST_LATER = 60
 
 
@@ -31,7 +30,7 @@ def eventful(record: Record, drive_pa: Column, first: int, end: int) -> Mask:
     happens[0] = True
     happens[1:] |= np.diff(drive_pa[first:end]) != 0.0
     x = np.where(record.valid, record.position_m, np.nan)[first:end]
-    happens[1:] |= np.abs(np.diff(x)) > STANDS_STILL * record.scale_m
+    happens[1:] |= moving(x, record.scale_m)
     if record.load_n is not None:
         happens[1:] |= np.diff(record.load_n[first:end]) != 0.0
     rows = np.arange(count)

@@ -15,7 +15,7 @@ from typing import NamedTuple
 import numpy as np
 
 from config.recording import Recording
-from workbench.data.motion import slips
+from signals.moves import slips
 from workbench.data.record import SLIP_ROWS, STRETCH, Record, ready
 from workbench.data.stillness import eventful
 

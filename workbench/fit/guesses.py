@@ -10,14 +10,13 @@ moves, a model is indifferent to its delay but within a sample of the right one:
 """
 
 from collections.abc import Sequence
-from itertools import pairwise
 from typing import NamedTuple
 
 import numpy as np
 from scipy.optimize import minimize_scalar
 
 from config.recording import Column
-from workbench.data.motion import directions
+from signals.moves import moves, rests
 from workbench.data.record import Record
 from workbench.model.parameters import Parameter
 
@@ -34,8 +33,6 @@ FINEST_OF_RESTS = 0.8
 SURE_OF_REST = 60
 """Samples of a rest from which on it counts no more than another: its noise is no longer what matters."""
 PER_LOBE = 8.0
-MOVED = 5.0
-"""Noises from one sample to the next that are a move."""
 OF_DELAYS = (0.5, 0.25, 0.75)
 """Quantiles of the delays from which searches begin."""
 
@@ -89,7 +86,7 @@ def likely_delays_s(record: Record) -> list[float]:
     for first, end in record.segments:
         changed = np.flatnonzero(np.diff(record.command_pa[first:end])) + 1
         seen_m = np.where(record.valid, record.position_m, np.nan)[first:end]
-        moved = np.flatnonzero(np.abs(np.diff(seen_m)) > MOVED * record.scale_m) + 1
+        moved = np.array([each.before + 1 for each in moves(seen_m, record.scale_m)], dtype=np.int64)
         if not moved.size:
             continue
         after = moved[np.minimum(np.searchsorted(moved, changed), moved.size - 1)]
@@ -135,10 +132,8 @@ def _rests_m(record: Record) -> tuple[Column, Column]:
     places, weights = [], []
     for first, end in record.segments:
         position_m = np.where(record.valid, record.position_m, np.nan)[first:end]
-        way = directions(position_m, record.scale_m)
-        edges = [0, *(1 + np.flatnonzero(np.diff(way != 0))).tolist(), way.size]
-        for begin, over in pairwise(edges):
-            if way[begin] == 0 and over - begin >= LEAST_REST:
-                places.append(float(np.nanmedian(position_m[begin:over])))
-                weights.append(min(over - begin, SURE_OF_REST) / SURE_OF_REST)
+        for each in rests(position_m, record.scale_m):
+            if each.end - each.first >= LEAST_REST:
+                places.append(float(np.nanmedian(position_m[each.first : each.end])))
+                weights.append(min(each.end - each.first, SURE_OF_REST) / SURE_OF_REST)
     return np.array(places), np.array(weights)

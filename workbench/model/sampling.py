@@ -32,8 +32,8 @@ import numpy as np
 
 from config.recording import Column
 from config.valve_file import ValveParameters
+from signals.moves import Rest, rests
 from sim.effect import Effect
-from workbench.data.plateaus import Plateau, plateaus
 from workbench.data.record import Record
 from workbench.model.command_between_samples import PartOfTheWay, part_of_the_way
 
@@ -198,7 +198,7 @@ def _early(record: Record, valve: ValveParameters) -> tuple[int, int]:
     """Return how many movements from rest begin early, and how many there are."""
     early = begun = 0
     least_pa = NEGLIGIBLE_N * valve.coulomb_n / valve.diaphragm_area_m2
-    for each in _plateaus(record):
+    for each in _rests(record):
         last = each.end - 1
         end = _segment_end(record, last)
         if each.end >= end or each.first > last - 2:
@@ -218,9 +218,9 @@ def _segment_end(record: Record, row: int) -> int:
 
 
 class Landing(NamedTuple):
-    """A plateau that a slide ended in; whether the pressure had settled then."""
+    """A rest that a slide ended in, by the record's rows; whether the pressure had settled then."""
 
-    plateau: Plateau
+    rest: Rest
     settled: bool
 
 
@@ -230,11 +230,16 @@ def landings(record: Record, valve: ValveParameters) -> tuple[Landing, ...]:
     pressure_pa = record.command_pa if record.pressure_pa is None else record.pressure_pa
     return tuple(
         Landing(each, float(np.ptp(pressure_pa[each.first : each.first + 2])) * valve.diaphragm_area_m2 <= allowed_n)
-        for each in _plateaus(record)
+        for each in _rests(record)
         if each.direction
     )
 
 
-def _plateaus(record: Record) -> list[Plateau]:
+def _rests(record: Record) -> list[Rest]:
+    """Return the rests of a record, by its rows."""
     position_m: Column = np.where(record.valid, record.position_m, np.nan)
-    return [each for first, end in record.segments for each in plateaus(position_m[first:end], record.scale_m, first)]
+    return [
+        each._replace(first=first + each.first, end=first + each.end)
+        for first, end in record.segments
+        for each in rests(position_m[first:end], record.scale_m)
+    ]

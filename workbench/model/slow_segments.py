@@ -181,7 +181,7 @@ def _longest_s(record: Record, composition: Composition) -> float:
 def _told(record: Record, valve: ValveParameters, held: bool) -> tuple[Column, Mask]:
     """Return the direction in which the stem went in the sample before each row, and which rows are judged, (n,)."""
     told, judged = np.zeros(len(record)), np.zeros(len(record), np.bool_)
-    for plateau, settled in landings(record, valve):
-        told[plateau.first] = plateau.direction
-        judged[plateau.first : min(plateau.end, plateau.first + JUDGED)] = held or settled
+    for rest, settled in landings(record, valve):
+        told[rest.first] = rest.direction
+        judged[rest.first : min(rest.end, rest.first + JUDGED)] = held or settled
     return told, judged

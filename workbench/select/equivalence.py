@@ -24,11 +24,11 @@ import numpy as np
 from config.drive import Scale
 from config.recording import Column
 from config.valve_file import EffectTable, ValveFile, ValveParameters
+from signals.moves import slips
 from sim.composition import BASE, Composition
 from sim.effect import Effect
 from sim.interpreted import interpreted
 from workbench.data.held_out import Part, Split
-from workbench.data.motion import slips
 from workbench.model.free_run import FreeRun
 
 BACKLASH = "backlash"

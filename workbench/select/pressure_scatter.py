@@ -1,6 +1,6 @@
 """How far the noise of a measured pressure moves the stem that it drives in a simulation.
 
-    d = x(p + e) - x(p)      e white, of the standard deviation that the pressure shows at rest (`config.noise`); told
+    d = x(p + e) - x(p)      e white, of the standard deviation that the pressure shows at rest (`signals.noise`); told
                              when the stem moves, so that it lands elsewhere, and leaves when it left
     typical = median rms of d, block by block of time
 
@@ -12,8 +12,8 @@ from dataclasses import replace
 
 import numpy as np
 
-from config.noise import position_noise_m
 from config.recording import Column
+from signals.noise import position_noise_m
 from sim.composition import Composition
 from workbench.data.held_out import Part, PressureScatter, Split, residual_m
 from workbench.fit.fit_result import Fit

@@ -16,7 +16,8 @@ import numpy.typing as npt
 
 from config.recording import Column
 from signals.independence import independent_share
-from workbench.data.motion import directions, velocity_m_per_s
+from signals.moves import directions
+from workbench.data.motion import velocity_m_per_s
 from workbench.data.record import Record
 
 FOLDS = 5

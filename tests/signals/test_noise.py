@@ -5,7 +5,7 @@ from itertools import pairwise
 import numpy as np
 import pytest
 
-from config.noise import frozen, held_back_m, noise_by_median, position_noise_m, quantum_m
+from signals.noise import frozen, held_back_m, noise_by_median, position_noise_m, quantum_m
 
 NOISE_M = 2e-5
 
