@@ -3,6 +3,7 @@
 Its files:
 
     valve_file, slave_file, daemon_file           what a person writes: the valve, the simulated slave, the daemon
+    actuators                                     which actuators are simulated and positioned; what others need
     drive                                         the names and units of what a force, torque or current moves
     travel, travel_table                          opening and stem, by the action of air; table [travel]
     data_sheet, valve_changes                     a valve file from a data sheet; another with values set by hand

@@ -202,6 +202,7 @@ class ValveTestVerdict(Code):
     UNDETERMINED = 12, "cannot be told"
     CHANGED = 13, "figures have changed since the record it is compared with"
     SLOW = 14, "slower than the reference"
+    NO_SPRING = 15, "no spring is seen: the stem goes from end to end at one command"
 
 
 class Refusal(Code):

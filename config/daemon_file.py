@@ -15,10 +15,11 @@ from typing import Annotated, Any, Literal, Self
 
 from pydantic import AfterValidator, BeforeValidator, Field, IPvAnyNetwork, model_validator
 
+from config.actuators import Actuator
 from config.alarm_table import AlarmsTable
 from config.bus_plugins import AnyDevice
 from config.device import Host, ModbusDevice, ModbusTcpDevice
-from config.drive import ROTARY, VALVE, Kind, Scale, as_written, in_si
+from config.drive import ROTARY, VALVE, Kind, Scale, as_written, in_si, require_degrees
 from config.errors import InputError
 from config.file_kinds import require_kind
 from config.law_names import DEFAULT_LAW, one_of_the_laws
@@ -53,21 +54,6 @@ def _written(network: object) -> object:
 Network = Annotated[IPvAnyNetwork, BeforeValidator(_written)]
 
 
-NOT_POSITIONED = {
-    "double_acting": "a cylinder without a spring needs a second pressure, commanded and measured, and a law for their "
-    "difference; allowed is spring_return",
-    "booster": "a volume booster needs its rates of filling and venting, which a law must know: positioner commission "
-    "prints them; with effect rate_limit of these in the file of [law] valve, write spring_return",
-}
-"""Actuators that people have and that no law here commands: what would be needed."""
-
-
-def _positioned(actuator: object) -> object:
-    if isinstance(actuator, str) and actuator in NOT_POSITIONED:
-        raise ValueError(f"is not positioned: {NOT_POSITIONED[actuator]}")
-    return actuator
-
-
 class ValveTable(Schema):
     """Table `[valve]`: what the controller must know of the valve before it identifies anything."""
 
@@ -78,8 +64,7 @@ class ValveTable(Schema):
     """What a rotary valve turns from end to end: a quarter turn is 90."""
     action: ActionWord = "air_to_open"
     """What more air does; openings count from the closed end (`config.travel`)."""
-    actuator: Annotated[Literal["spring_return"], BeforeValidator(_positioned)] = "spring_return"
-    """One pressure against a spring."""
+    actuator: Actuator = "spring_return"
     breakaway_pa: Pressure | None = None
     """F_s / A where it is known: the excitation's constant part must exceed it."""
 
@@ -468,6 +453,7 @@ def _validated(tables: dict[str, Any], source: str, folder: Path) -> DaemonFile:
     """Return one valve's file; what a rotary valve has in degrees is in rad inside."""
     valve = tables.get("valve")
     if isinstance(valve, dict) and "travel_deg" in valve:
+        require_degrees(tables.get("device"), source, "device")
         tables = {key: table if key == "valve" else in_si(table, source, key) for key, table in tables.items()}
     return validated(DaemonFile, tables, source, folder)
 

@@ -243,6 +243,19 @@ def in_si(tables: Any, source: str, *path: str) -> Any:
     return told
 
 
+def require_degrees(device: Any, source: str, key: str) -> None:
+    """Refuse a rotary valve's table of a device, by its key, that says no map: by default one is in metres.
+
+    Raises:
+        InputError: says what to write.
+    """
+    bus = device.get("bus", device.get("kind", "modbus")) if isinstance(device, dict) else "modbus"
+    if bus in ("modbus", "rtu", "canopen") and not (isinstance(device, dict) and "map" in device):
+        raise InputError(
+            source, f"{key}.map: is required of a rotary valve, with position_deg: by default it is in metres"
+        )
+
+
 def as_written(kind: Kind, name: str, value: Any) -> tuple[str, Any]:
     """Return a key of the plant's files and its value as a kind has them there.
 

@@ -158,10 +158,15 @@ _ESTIMATE_UNITS = {
 }
 
 
+TURNED = "; rad for m where it turns"
+"""Of a register whose unit has a metre."""
+
+
 def _estimate_registers_of(name: str, base: int, unit: str, text: str) -> tuple[Register, ...]:
+    where = TURNED if unit in ("m/s^2", "m/(Pa s^2)", "Pa/m") else ""
     return (
-        Register(f"{name}_e", base, "float32", unit, text),
-        Register(f"{name}_std", base + 2, "float32", unit, f"standard deviation of {name}_e"),
+        Register(f"{name}_e", base, "float32", unit, text + where),
+        Register(f"{name}_std", base + 2, "float32", unit, f"standard deviation of {name}_e{where}"),
         Register(f"{name}_valid", base + 4, "uint16", "1", "1 when the estimate may be used"),
         Register(f"{name}_reason", base + 5, "uint16", "1", "0 valid, else why not (positioner map --reasons)"),
     )
@@ -181,7 +186,7 @@ ESTIMATES = (
         "progress", 240, "float32", "1", "of the identification window, 0 to 1; at 1 the DCS may end S3 (eta_1 = 1)"
     ),
     Register("estimate_age", 242, "float32", "s", "time since the last sample the estimates used"),
-    Register("b_over_c_applied", 244, "float32", "Pa/m", "b/c as the law uses it; NaN: none yet"),
+    Register("b_over_c_applied", 244, "float32", "Pa/m", f"b/c as the law uses it; NaN: none yet{TURNED}"),
     Register("k_over_c_applied", 246, "float32", "Pa", "k/c as the law uses it; NaN: none yet"),
     Register("identifications", 248, "uint16", "1", "how many identifications were applied, wraps"),
     Register("refusals", 249, "uint16", "1", "how many were refused, wraps"),

@@ -6,9 +6,10 @@ from typing import Annotated, Literal, Self
 
 from pydantic import Field, Tag, model_validator
 
+from config.actuators import Actuator
 from config.canopen_device import CanBus
 from config.device import Host
-from config.drive import ROTARY, in_si
+from config.drive import ROTARY, in_si, require_degrees
 from config.errors import InputError
 from config.file_kinds import require_kind
 from config.loading import SHIPPED, Many, NonNegative, Port, Positive, Pressure, Schema, chosen_by, read_toml, validated
@@ -160,6 +161,7 @@ class SlaveFile(Schema):
     """A whole slave file. `valve` is a path from this file's folder, or the name of a shipped valve."""
 
     valve: str = "seed"
+    actuator: Actuator = "spring_return"
     action: ActionWord = "air_to_open"
     """Its position transmitter counts from the closed end, where `initial` has the stem as pressure drives it."""
     bus: AnyBus = ModbusTcpBus()
@@ -188,6 +190,7 @@ def load_slave(path: Path) -> SlaveFile:
     tables = read_toml(path)
     require_kind(tables, "slave", str(path))
     if _turns(tables.get("valve"), path):
+        require_degrees(tables.get("bus"), str(path), "bus")
         tables = in_si(tables, str(path))
     return validated(SlaveFile, tables, str(path), path.parent)
 

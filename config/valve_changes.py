@@ -11,7 +11,7 @@ from config.errors import InputError
 from config.loading import validated
 from config.valve_file import EffectTable, ValveFile, ValveParameters
 
-FIXED = ("name", "kind")
+FIXED = ("name", "kind", "actuator")
 
 
 def changed_valve(file: ValveFile, values: Mapping[str, float], without: Collection[str] = ()) -> ValveFile:

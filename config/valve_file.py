@@ -12,8 +12,9 @@ from collections.abc import Mapping
 from pathlib import Path
 from typing import Annotated, Any, Self
 
-from pydantic import BaseModel, ConfigDict, model_validator
+from pydantic import BaseModel, ConfigDict, Field, model_validator
 
+from config.actuators import Actuator
 from config.arguments import kinds_held
 from config.drive import KINDS, ROTARY, VALVE, Kind, KindName
 from config.errors import InputError
@@ -42,6 +43,7 @@ class ValveParameters(Schema):
     deadzone_ratio: Annotated[float, between(1e-9, 1e6)]
     stroke_m: Stroke
     kind: KindName = "valve"
+    actuator: Annotated[Actuator, Field(exclude=True)] = "spring_return"
 
     @property
     def own(self) -> Kind:
@@ -119,7 +121,8 @@ def _drive(tables: Mapping[str, Any], source: str) -> ValveFile:
         got = repr(table.get("kind")) if isinstance(table, dict) else repr(table)
         raise InputError(source, f"drive.kind: must be {', '.join(kinds[:-1])} or {kinds[-1]}, got {got}")
     kind = KINDS[table["kind"]]
-    names = {kind.own(name): name for name in ValveParameters.model_fields if name != "diaphragm_area_m2" or kind.area}
+    lacks = {"actuator"} if kind.area else {"actuator", "diaphragm_area_m2"}
+    names = {kind.own(name): name for name in ValveParameters.model_fields if name not in lacks}
     for key in table:
         if key not in names:
             raise InputError(source, f"drive.{key}: unknown key; allowed here: {', '.join(names)}")

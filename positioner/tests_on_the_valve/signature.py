@@ -25,6 +25,7 @@ from math import hypot, sqrt
 
 import numpy as np
 
+from config.actuators import NEEDED
 from config.codes import ValveTestVerdict
 from config.drive import VALVE, Kind
 from config.errors import InputError
@@ -101,7 +102,7 @@ def signature(recordings: "list[Recording]", plate: Nameplate) -> Outcome:
     notes = [f"{each.reason}: the file's stroke stands for it" for each in (low, high) if each.reason]
     rates = ", ".join(f"{1e-3 * each:.3g}" for each in ramps.rates_pa_per_s)
     notes.append(f"{len(ramps.lines)} ramps at {rates} kPa/s")
-    verdict, told = _verdict(travel, plate)
+    verdict, told = _verdict(ramps, travel, 0.5 * (x_0 + x_1), plate)
     quantities = [
         *_ends(ramps, travel),
         *_spring(ramps, plate),
@@ -146,9 +147,14 @@ def supply_lacking(recordings: "Sequence[Recording]") -> str:
     return ""
 
 
-def _verdict(travel: Figure, plate: Nameplate) -> tuple[tuple[ValveTestVerdict, ...], list[str]]:
+def _verdict(
+    ramps: Ramps, travel: Figure, half_m: float, plate: Nameplate
+) -> tuple[tuple[ValveTestVerdict, ...], list[str]]:
     if travel.value is None:
         return (ValveTestVerdict.UNDETERMINED,), ["the ramps did not take the stem from end to end"]
+    apart, slope = difference(ramps.at_slowest(1, half_m), ramps.at_slowest(-1, half_m)), ramps.slope_pa_per_m()
+    if (slope.value or 0.0) * travel.value < THRESHOLDS.springless * (apart.value or 0.0):
+        return (ValveTestVerdict.NO_SPRING,), [f"a broken spring, or {NEEDED['double_acting']}"]
     off_m = abs(travel.value - plate.stroke_m)
     if off_m > max(THRESHOLDS.stroke_wrong * plate.stroke_m, travel.plus_minus or 0.0):
         told = (

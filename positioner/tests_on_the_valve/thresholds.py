@@ -55,8 +55,10 @@ class Thresholds:
     moved_sigmas: float = 5.0
     """Deviations of the noise beyond which a leg has moved the stem."""
 
-    rate_ratio: float = 4.0
-    """Of the fast rate to the slow one: taken to no rate, the slow ramp's error grows by 4/3 only."""
+    rate_ratio: float = 3.0
+    """Of the fast rate to the slow one: taken to no rate, the slow ramp's error grows by 3/2 only. A stem that breaks
+    loose at a third more than it slides at still sticks at this rate; at four times the slow one it slides all the way,
+    and the friction at no rate is 1.5 % high."""
     end_held_s: float = 1.0
     """At each end of a ramp, for the stem to come to rest."""
     slowest_leg_s: float = 60.0
@@ -69,6 +71,8 @@ class Thresholds:
     """Of the travel at each end, where no error band is taken: in one direction the stem lies on a stop there."""
     stroke_wrong: float = 0.05
     """A travel farther from the file's is another stroke than the file says."""
+    springless: float = 0.5
+    """Of the commands between the ramps up and down: a stem that crosses its travel within less has no spring."""
     supply_lacking: float = 0.05
     """Of the commands' span: a measured pressure farther from the command at its extremes is no supply, or no I/P."""
 

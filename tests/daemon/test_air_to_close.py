@@ -6,8 +6,7 @@ import pytest
 
 from config.codes import Mode, Ne107Status
 from config.daemon_file import DaemonFile, load_daemon
-from config.errors import InputError
-from config.loading import SHIPPED, validated
+from config.loading import SHIPPED
 from config.registers import BY_NAME
 from config.slave_file import load_slave
 from config.travel import Travel
@@ -103,9 +102,3 @@ def test_what_was_learnt_with_air_to_open_is_not_taken_for_one_that_air_closes()
     )
     assert closes.items() - opens.items() == {("valve.action", '"air_to_close"')}
     assert not opens.items() - closes.items()
-
-
-@pytest.mark.parametrize(("actuator", "needed"), [("double_acting", "a second pressure"), ("booster", "its rates")])
-def test_an_actuator_that_is_not_positioned_is_refused_with_what_would_be_needed(actuator: str, needed: str) -> None:
-    with pytest.raises(InputError, match=rf"^site\.toml: valve\.actuator: is not positioned: .*{needed}"):
-        validated(DaemonFile, {"valve": {"stroke_m": 0.04, "actuator": actuator}}, "site.toml")

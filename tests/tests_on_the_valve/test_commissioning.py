@@ -124,8 +124,18 @@ def unsupplied() -> Commissioned:
     return commissioned(faults=(DeviceFault(kind="supply", at_s=0.0, to_pa=61e3),))[0]
 
 
+def springless() -> Commissioned:
+    """Return what a cylinder comes to that a constant pressure pushes back."""
+    return commissioned(valve=told(spring_n_per_m=0.0))[0]
+
+
 @pytest.mark.parametrize(
-    ("bad", "verdict"), [(stuck, ValveTestVerdict.NOT_MOVED), (unsupplied, ValveTestVerdict.NO_SUPPLY)]
+    ("bad", "verdict"),
+    [
+        (stuck, ValveTestVerdict.NOT_MOVED),
+        (unsupplied, ValveTestVerdict.NO_SUPPLY),
+        (springless, ValveTestVerdict.NO_SPRING),
+    ],
 )
 def test_what_is_wrong_ends_it_in_a_code_and_proposes_nothing(bad: object, verdict: ValveTestVerdict) -> None:
     found = bad()  # type: ignore[operator]

@@ -1,6 +1,7 @@
 """A rotary valve is commissioned, tested and reported in degrees and newton metres: nobody sees a metre or a radian."""
 
 import json
+import re
 from collections.abc import Iterator
 from contextlib import contextmanager
 from math import degrees, radians
@@ -10,7 +11,8 @@ import pytest
 
 from config.daemon_file import DaemonFile, load_daemon
 from config.errors import InputError
-from config.slave_file import Initial
+from config.registers import REGISTERS
+from config.slave_file import Initial, load_slave
 from config.valve_file import load_valve, shipped_valve
 from positioner.cli.main import main
 from tests.tests_on_the_valve.virtual_valve import VirtualValve
@@ -120,3 +122,22 @@ def test_a_file_that_mixes_lengths_and_angles_is_refused_in_a_line(
     path.write_text(SITE.replace(before, after))
     with pytest.raises(InputError, match=said):
         load_daemon(path)
+
+
+@pytest.mark.parametrize("bus", ["", '[device]\nbus = "canopen"\n'])
+def test_a_device_whose_registers_are_in_metres_is_refused(bus: str, tmp_path: Path) -> None:
+    site, slave = tmp_path / "site.toml", tmp_path / "slave.toml"
+    site.write_text(f"[valve]\ntravel_deg = 90.0\n{bus}")
+    slave.write_text('valve = "rotary"\n' + bus.replace("device", "bus").replace("bus =", "kind ="))
+    needed = r"\.map: is required of a rotary valve, with position_deg"
+    with pytest.raises(InputError, match=rf"site\.toml: device{needed}"):
+        load_daemon(site)
+    with pytest.raises(InputError, match=rf"slave\.toml: bus{needed}"):
+        load_slave(slave)
+
+
+def test_a_register_whose_unit_has_a_metre_says_what_it_has_where_it_turns() -> None:
+    metres = [each for each in REGISTERS if "m" in re.split(r"[^a-z]", each.unit)]
+    assert metres
+    for each in metres:
+        assert "it turns" in each.text or each.name == "position_m", each.name

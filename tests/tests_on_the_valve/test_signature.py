@@ -135,7 +135,7 @@ def test_what_cannot_be_told_is_said_in_a_code() -> None:
 
 
 def test_a_time_limit_that_is_too_short_is_refused() -> None:
-    with pytest.raises(InputError, match=r"site: experiment.limit_s: a signature needs 28.6 s"):
+    with pytest.raises(InputError, match=r"site: experiment.limit_s: a signature needs 26.1 s"):
         programmes(replace(BOUNDS, longest_s=20.0), 0.0, "site")
 
 
