@@ -1,6 +1,7 @@
 """Commissioning and signature of a valve that is not ours: LuGre friction, another integrator, an I/P of 40 ms.
 
     python -m benchmarks.other_valve_tests [--variants plain 12_bit air_to_close rotary] [--seed 0] [--sticking]
+    python -m benchmarks.other_valve_tests --wire            ten minutes: the commands, in real time, over Modbus TCP
 
 The plant is that of `tests/other_device.py`, 50 ms a cycle in virtual time, with 1 % noise of the stroke, or 12 bits.
 What is commissioned is unknown but for device and supply. Each line says how far figures are off. Friction is to be
@@ -9,29 +10,48 @@ third more. Then slow ramps show the mean of where it breaks loose and where it 
 below the least that any speed needs:
 
     F = (F_s + min_v (g(v) + F_v v)) / 2        g(v) = F_c + (F_s - F_c) exp(-(v/v_s)^2)
+
+With --wire the device is the server of another library (modbus-tk) on a clock of its own, 12 bits and mbar, without
+function 23: commissioned by the command, then served by a daemon, whose valve has its signature and partial strokes.
 """
 
 import argparse
 from collections.abc import Callable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, replace
 from math import radians
+from pathlib import Path
+from tempfile import TemporaryDirectory
 
 import numpy as np
 
 from config.codes import Mode
 from config.daemon_file import DaemonFile
 from config.drive import Kind
+from positioner.cli.main import main as cli
 from positioner.cli.parts.own_valve import unknown_travel
 from positioner.control.requests import ExperimentRequest, Requests
 from positioner.control.settings import Settings
 from positioner.daemon.cycle import Cycle
+from positioner.history.kept_tests import folder_of
 from positioner.tests_on_the_valve.commissioning import commission
+from positioner.tests_on_the_valve.kept_records import records
 from positioner.tests_on_the_valve.outcome import Outcome
 from positioner.tests_on_the_valve.own_cycle import OwnCycle
 from positioner.tests_on_the_valve.signature import Nameplate, programmes, signature
 from positioner.virtual.virtual_cycle import virtual_cycle
+from tests.children import child
 from tests.control.other_plant import OtherPlant
-from tests.other_device import BITS, Parameters
+from tests.other_device import (
+    BITS,
+    COMMAND,
+    MBAR_PA,
+    POSITION,
+    PRESSURE,
+    UNIT,
+    Parameters,
+    free_port,
+    other_device,
+)
 
 PERIOD_S = 0.05
 NOISE = 0.01
@@ -174,9 +194,67 @@ def report(names: Sequence[str], seed: int, *, sticking: bool) -> Iterator[str]:
         yield f"{name}: commissioning {commissioned.said}, signature {signed.said}"
         for test, outcome in (("signature", signed), ("commissioning", commissioned)):
             if outcome.quantities:
-                told = errors(outcome, variant.parameters).items()
-                said = (f"{each} {off:+.2%}{'' if abs(off) <= ALLOWED[each] else ' MISSED'}" for each, off in told)
-                yield f"    {test:14} {', '.join(said)}"
+                yield f"    {test:14} {_said(errors(outcome, variant.parameters))}"
+
+
+def _said(off: Mapping[str, float]) -> str:
+    return ", ".join(f"{each} {by:+.2%}{'' if abs(by) <= ALLOWED[each] else ' MISSED'}" for each, by in off.items())
+
+
+SITE = """[valve]
+name = "other"
+[device]
+port = {port}
+unit = {unit}
+reply_timeout_s = 0.4
+[device.map]
+position_m = {{ address = {position}, type = "uint16", scale = {digit_m} }}
+pressure_pa = {{ address = {pressure}, type = "uint16", scale = {mbar_pa} }}
+command_pa = {{ address = {command}, type = "uint16", scale = {mbar_pa} }}
+[cycle]
+period_s = 0.05
+[pressure]
+maximum_pa = 140e3
+[safety]
+stale_after_s = 2.0
+[experiment]
+travel_window = [0, 1]
+limit_s = 90
+[recorder]
+folder = "recordings"
+[history]
+folder = "history"
+[supervisory]
+port = {served}
+"""
+
+
+def over_the_wire(folder: Path, parameters: Parameters) -> Iterator[str]:
+    """Yield what each command ends with, and how far its figures are off."""
+    site, history = folder / "site.toml", folder_of(folder / "history", "other")
+    with other_device(0.5 * parameters.stroke_m, parameters) as device:
+        text = SITE.format(
+            port=device.port,
+            unit=UNIT,
+            position=POSITION,
+            pressure=PRESSURE,
+            command=COMMAND,
+            digit_m=parameters.stroke_m / BITS,
+            mbar_pa=MBAR_PA,
+            served=free_port(),
+        )
+        site.write_text(text)
+        yield f"commission ends with {cli(['commission', str(site), '--yes', '--keep', 'as_found'])}"
+        with child("run", site):
+            for register, value in (("mode", "automatic"), ("experiment_consent", "1"), ("reference", "0.5")):
+                cli(["set", register, value, "--config", str(site)])
+            yield f"signature ends with {cli(['signature', str(site), '--keep', 'as_left'])}"
+            yield f"pst ends with {cli(['pst', str(site), '--keep', 'as_left'])}"
+            yield f"pst against it ends with {cli(['pst', str(site)])}"
+    for each in records(history):
+        figures = {quantity.name for quantity in each.outcome.quantities}
+        told = errors(each.outcome, parameters) if "bench_low_pa" in figures else {}
+        yield f"{each.outcome.test}: {each.outcome.said} {_said(told)}"
 
 
 def main() -> None:
@@ -185,7 +263,13 @@ def main() -> None:
     parser.add_argument("--variants", nargs="+", choices=VARIANTS, default=list(VARIANTS))
     parser.add_argument("--seed", type=int, default=0)
     parser.add_argument("--sticking", action="store_true")
+    parser.add_argument("--wire", action="store_true")
     arguments = parser.parse_args()
+    if arguments.wire:
+        with TemporaryDirectory() as folder:
+            for line in over_the_wire(Path(folder), SLIDING):
+                print(line, flush=True)
+        return
     for line in report(arguments.variants, arguments.seed, sticking=arguments.sticking):
         print(line, flush=True)
 
