@@ -199,8 +199,8 @@ def _trimmed(
     band = STANDS_OUT * noise_std_m + 1e-9
     rests_from = max(before, begin - max(REST_WINDOWS * max(window, 2 * FEWEST_SAMPLES), (end - begin) // REST_SHARE))
     from_rest, starts = _leaves_rest(travel, rests_from, begin, end, band, window)
-    if not from_rest and before == 0 and _jumps_at_once(pressure_pa):
-        from_rest, rests_from, starts = True, 0, 1
+    if not from_rest and before == 0 and (jumped := _jumps_soon(pressure_pa, travel, band)):
+        from_rest, rests_from, starts = True, 0, jumped
     stop = _reaches_rest(travel, begin, end, after, band, window)
     if stop - starts < 2 * FEWEST_SAMPLES:
         return None, (starts, max(stop, starts))
@@ -233,10 +233,17 @@ def _leaves_rest(travel: Array, rests_from: int, begin: int, end: int, band: flo
     return True, rests_from + int(twice[0]) - 1
 
 
-def _jumps_at_once(pressure_pa: Array) -> bool:
-    """Whether the record begins with the jump of the pressure that moved the stem: then it rested until then."""
+def _jumps_soon(pressure_pa: Array, travel: Array, band: float) -> int:
+    """Return the row after the jump of the pressure that moved the stem, soon after the record began; else 0.
+
+    The rest before it is too short to be known by itself: where the stem is in one place, it rested until then.
+    """
     jumps = np.abs(np.diff(pressure_pa[:200]))
-    return bool(len(jumps) > FEWEST_SAMPLES and jumps[0] > JUMP * jumps[1:].max())
+    if len(jumps) <= FEWEST_SAMPLES:
+        return 0
+    after = int(jumps[:FEWEST_SAMPLES].argmax()) + 1
+    alone = jumps[after - 1] > JUMP * np.delete(jumps, after - 1).max()
+    return after if alone and float(np.ptp(travel[:after])) <= 2 * band else 0
 
 
 def _reaches_rest(travel: Array, begin: int, end: int, after: int, band: float, window: int) -> int:

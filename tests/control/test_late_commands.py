@@ -1,7 +1,6 @@
-"""A loop in real time: commands come into force a little late, and what S3 finds by its sine is right, or refused.
+"""A loop in real time: commands come into force some periods late, and what S3 finds by its sine is applied all the same.
 
-At a lateness of two periods the fit sees that the pressure at the jump into S3 was not as recorded, and gives no
-estimates: nothing is applied. A lateness that is longer it can tell by itself.
+The pressure is that in force: however late it comes, the stem leaves its rest at its jump.
 """
 
 from collections import deque
@@ -70,14 +69,11 @@ def reasons(monkeypatch: pytest.MonkeyPatch) -> list[Refusal]:
     return said
 
 
-@pytest.mark.parametrize(
-    ("periods", "reason"), [(1, Refusal.VALID), (2, Refusal.MODEL_DOES_NOT_FIT), (10, Refusal.VALID)]
-)
-def test_what_late_commands_identify_is_right_or_refused(periods: int, reason: Refusal, reasons: list[Refusal]) -> None:
+@pytest.mark.parametrize("periods", [1, 2, 4, 10])
+def test_late_commands_are_identified(periods: int, reasons: list[Refusal]) -> None:
+    """A record that begins two to five samples before the stem leaves has a rest too short to be known by itself."""
     ratios = identified_when_late(periods).applied.ratios
-    assert reasons == [reason]
-    assert (ratios is not None) == (reason is Refusal.VALID)
-    if ratios is None:
-        return
+    assert reasons == [Refusal.VALID]
+    assert ratios is not None
     assert -ratios.b_over_c == pytest.approx(VALVE.spring_n_per_m / VALVE.diaphragm_area_m2, rel=1e-3)
     assert -ratios.k_over_c == pytest.approx(VALVE.coulomb_n / VALVE.diaphragm_area_m2, rel=1e-3)
