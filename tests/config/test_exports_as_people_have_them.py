@@ -607,6 +607,11 @@ REFUSED = {
     "a truncated MATLAB file": Bad(
         b"MATLAB 5.0 MAT-file".ljust(124) + b"\x00\x01IM\x0e\x00\x00", "damaged MATLAB file|no vectors"
     ),
+    "a midnight by which a month passes": Bad(
+        text(rows(time=day(datetime.datetime(2026, 1, 2, 23, 59, 58), "%d/%m/%Y %H:%M:%S.%f"))),
+        'line 6: .* is 27 days off the row before it by .*; it is not by --time-format "%d/%m/%Y',
+        options=ExportOptions(time_format="%m/%d/%Y %H:%M:%S.%f"),
+    ),
     "a sheet of a text": Bad(
         text(rows()), "--sheet: goes with an Excel workbook", options=ExportOptions(sheet="Trend")
     ),

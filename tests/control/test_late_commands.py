@@ -1,4 +1,4 @@
-"""A loop in real time: commands come into force some periods late, and what S3 finds by its sine is applied all the same.
+"""A loop in real time: commands come into force some periods late, and what S3 finds by its sine is applied.
 
 The pressure is that in force: however late it comes, the stem leaves its rest at its jump.
 """

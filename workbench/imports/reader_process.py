@@ -1,12 +1,14 @@
 """A file read in a process of its own, by a library that a damaged one may end by a signal, or keep for ever.
 
-That ends this process alone, and the file is refused. What it read comes back as arrays, in a file that goes then.
+That ends this process alone, and the file is refused. For ever is known by the processor's time that it has used, where
+the system counts that: a busy machine damages no file. What it read comes back as arrays, in a file that goes then.
 
-    python -P -m MODULE FILE READ.npz      is what it runs; it refuses by a line on standard error
+    python -P -m MODULE FILE READ.npz LIMIT_S      is what it runs; it refuses by a line on standard error
 """
 
 import json
 import os
+import signal
 import subprocess
 import sys
 import tempfile
@@ -15,6 +17,11 @@ from pathlib import Path
 
 import numpy as np
 
+try:
+    import resource
+except ImportError:  # Windows: there the clock on the wall decides
+    resource = None  # type: ignore[assignment]
+
 from config.errors import InputError
 from workbench.imports.typed_tables import Columns
 
@@ -22,7 +29,8 @@ Groups = list[tuple[str, Columns]]
 """Columns of float64 by their names, of each group, by its name."""
 REFUSED = 2
 LONGEST_S, BYTES_A_S = 20.0, 1e6
-"""For which it may read; more of a large file. The slowest library here takes a tenth of a second for a megabyte."""
+"""Of the processor, for which it may read; more of a large file. The slowest library takes a tenth of a second for a
+megabyte."""
 
 
 def read_apart(path: Path, module: str, kind: str) -> Groups:
@@ -38,14 +46,22 @@ def read_apart(path: Path, module: str, kind: str) -> Groups:
     """
     with tempfile.TemporaryDirectory(prefix="positioner-read-") as folder:
         into = Path(folder) / "read.npz"
-        words = [sys.executable, "-P", "-m", module, str(path.absolute()), str(into)]
         limit_s = LONGEST_S + path.stat().st_size / BYTES_A_S
+        words = [sys.executable, "-P", "-m", module, str(path.absolute()), str(into), f"{limit_s:.0f}"]
         try:
             ended = subprocess.run(
-                words, capture_output=True, text=True, errors="replace", timeout=limit_s, check=False
+                words,
+                stdin=subprocess.DEVNULL,
+                capture_output=True,
+                text=True,
+                errors="replace",
+                timeout=limit_s if resource is None else None,
+                check=False,
             )
         except subprocess.TimeoutExpired:
-            raise damaged(path, kind, f"its reader comes to no end in {limit_s:.0f} s") from None
+            raise _endless(path, kind, limit_s) from None
+        if resource is not None and ended.returncode == -signal.SIGXCPU:
+            raise _endless(path, kind, limit_s)
         if ended.returncode == REFUSED:
             raise InputError(str(path), ended.stderr.strip().rpartition("\n")[2])
         if ended.returncode:
@@ -56,8 +72,11 @@ def read_apart(path: Path, module: str, kind: str) -> Groups:
     return [(group, {name: next(each) for name in channels}) for group, channels in json.loads(str(names))]
 
 
-def write_read(read: Callable[[Path], Groups], path: str, into: str) -> None:
+def write_read(read: Callable[[Path], Groups], path: str, into: str, limit_s: str) -> None:
     """Read a file into another, or say why not and end: what is run in the process of its own."""
+    if resource is not None:
+        resource.setrlimit(resource.RLIMIT_CORE, (0, 0))
+        resource.setrlimit(resource.RLIMIT_CPU, (int(limit_s), resource.RLIM_INFINITY))
     try:
         groups = read(Path(path))
     except InputError as error:
@@ -65,6 +84,10 @@ def write_read(read: Callable[[Path], Groups], path: str, into: str) -> None:
         os._exit(REFUSED)  # at once: objects of a library that were not made complain of that when they go
     names = json.dumps([(name, list(group)) for name, group in groups])
     np.savez(into, np.array(names), *(each for _, group in groups for each in group.values()))
+
+
+def _endless(path: Path, kind: str, limit_s: float) -> InputError:
+    return damaged(path, kind, f"its reader comes to no end in {limit_s:.0f} s")
 
 
 def damaged(path: Path, kind: str, why: str) -> InputError:

@@ -4,7 +4,8 @@
     31.01.2026 12:00:00     01/02/26 1:30 PM    12:00:00      --time-format "%d.%m.%Y %H:%M:%S"
 
 Fractions may have a comma, more digits than microseconds have, or be left out where they are zero. A date that only a
-person can tell (01/02/2026) is never guessed: the line that refuses it proposes the formats that would read it.
+person can tell (01/02/2026) is never guessed: the line that refuses it proposes the formats that would read it. A
+midnight in the file tells: one way the day goes on, the other way a month passes.
 """
 
 import re
@@ -59,7 +60,7 @@ def seconds_of(
     """Return the seconds, (n,), from the first of n stamps, the first from 1970, s, and whether these are local times.
 
     Raises:
-        InputError: a stamp that cannot be read; names it and its line and what would read it.
+        InputError: a stamp that cannot be read, or day and month are interchanged; names it, its line and the cure.
     """
     stamps = np.empty(len(texts))
     naive = False
@@ -69,7 +70,28 @@ def seconds_of(
             raise _unreadable(path, texts, row, lines[row], time_format)
         naive = naive or stamp.tzinfo is None
         stamps[row] = (stamp if stamp.tzinfo else stamp.replace(tzinfo=UTC)).timestamp()
+    steps_s = np.abs(np.diff(stamps, prepend=stamps[0]))
+    if time_format is not None and steps_s.max() >= DAY_S and _without_gaps(texts, other := _interchanged(time_format)):
+        row = int(steps_s.argmax())
+        said = f"{texts[row]!r} is {steps_s[row] / DAY_S:.0f} days off the row before it by {time_format!r}"
+        raise InputError(str(path), f'line {lines[row]}: {said}; it is not by --time-format "{other}"')
     return stamps - stamps[0], float(stamps[0]), naive
+
+
+def _interchanged(time_format: str) -> str:
+    """Return a format with day and month interchanged."""
+    return re.sub("%[dm]", lambda each: "%m" if each[0] == "%d" else "%d", time_format)
+
+
+def _without_gaps(texts: Sequence[str], time_format: str) -> bool:
+    """Return whether a format reads all stamps, each less than a day from the one before it."""
+    before = None
+    for text in texts:
+        stamp = _by_format(text, time_format)
+        if stamp is None or (before is not None and abs((stamp - before).total_seconds()) >= DAY_S):
+            return False
+        before = stamp
+    return True
 
 
 def _stamp(text: str, time_format: str | None) -> datetime | None:
@@ -103,14 +125,17 @@ def _unreadable(path: Path, texts: Sequence[str], row: int, line: int, time_form
 
 
 def proposed_formats(texts: Sequence[str]) -> list[str]:
-    """Return the formats that read all of some stamps, but for those that say the same.
+    """Return the formats that read all of some stamps, but for those that say the same, or make a midnight a month.
 
     >>> proposed_formats(["01/02/2026 12:00:00"]), proposed_formats(["31/01/2026 12:00:00"])
     (['%d/%m/%Y %H:%M:%S', '%m/%d/%Y %H:%M:%S'], ['%d/%m/%Y %H:%M:%S'])
+    >>> proposed_formats(["02/01/2026 23:59:59", "02/02/2026 00:00:00"])
+    ['%m/%d/%Y %H:%M:%S']
     """
     fractions = any(re.search(r":\d+[.,]\d+", text) for text in texts)
     found = []
     for form in PROPOSED:
         if fractions == ("%f" in form) and texts and all(_by_format(text, form) is not None for text in texts):
             found.append(form)
-    return found
+    going_on = [each for each in found if _interchanged(each) in found and _without_gaps(texts, each)]
+    return [each for each in found if each in going_on or _interchanged(each) not in going_on]
