@@ -6,7 +6,7 @@ What `sim.kernel` compiles for whole runs, for those who ask a single place a fe
 from collections.abc import Callable, Sequence
 from pathlib import Path
 from types import ModuleType
-from typing import Any
+from typing import Any, NamedTuple
 
 from sim import karnopp
 from sim.effect import Effect, execute
@@ -27,6 +27,20 @@ def interpreted(effects: Sequence[Effect]) -> Any:
         if filled:
             module.__dict__[place] = _one_after_the_other([(parts[each.effect][place], each) for each in filled])
     return module
+
+
+class Law(NamedTuple):
+    """An effect's own function in a place, of the arguments that it names, the last its parameters'."""
+
+    function: Callable[..., Any]
+    parameters: Callable[..., Any]
+
+
+def own_law(effect: Effect, place: str) -> Law:
+    """Return the law by which an effect without a memory fills a place."""
+    own: dict[str, Any] = {"__name__": effect.name}
+    execute(effect.source, effect.path, own)
+    return Law(own[place], own["Parameters"])
 
 
 def _places(effect: Effect) -> dict[str, Any]:

@@ -106,7 +106,7 @@ def test_friction_grows_over_the_stroke_by_position_or_pressure(curve: ForceDiag
     assert curve.verdict == "one_of"
     assert curve.indistinguishable[0] == ("position_friction", "pressure_friction")
     assert "position_friction or pressure_friction: the same position at different pressures" in curve.sentence
-    assert curve.best.parameters["position_friction.growth_n"] > 0.0
+    assert curve.best.parameters["position_friction.growth"] > 0.0
 
 
 def test_the_curves_errors_are_those_established(curve: ForceDiagnosis) -> None:

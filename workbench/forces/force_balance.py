@@ -3,23 +3,19 @@
     load = -A p + k_s x + F_v v + F_c z + F_0 + terms      a bench: A, k_s, F_v, F_c, F_0 fitted
     A p  =        k_s x         + F_c z + F_0 + terms      a static curve: A given, k_s, F_c, F_0 fitted
 
-z is the direction of motion, +1 or -1, until presliding is added. The terms, each with the name of the effect whose
-force or friction it is:
+z is the direction of motion, +1 or -1, until presliding is added. The terms are those of the library's own laws
+(`sim.effects`) under the motion as it was imposed: with f the force and F the sliding friction, N, of an effect's file,
+and q its strength,
 
-    pressure_friction    mu max(p, 0) z            mu >= 0, N/Pa
-    pressure_power_friction
-                         F_1 (max(p, 0) / p_1)^n z F_1 >= 0, N, at p_1 = 100 kPa; n from 0.3 to 3
-    position_friction    g F_c s z                 s = x / L within 0 and 1, L the stroke; friction stays >= 0
-    friction_drift       r F_c t z                 t from the recording's start, s
-    stribeck             F_x exp(-(v / v_x)^2) z   F_x >= 0, N; v_x from those between 0.1 and 1 of the median speed
-    quadratic_drag       c v |v|                   c >= 0
-    asymmetric_viscosity c |v| / 2                 c of either sign, of which F_v takes half: |c| / 2 <= F_v
-    spring_hardening     k_3 x^3                   k_3 >= 0
-    area_variation       -dA s p                   dA of either sign
-    presliding           z' = 1 / x_f within -1 <= z <= 1: the packing yields over x_f = F_c / k_p before it slips
+    term    q dF/dq z       at q = 0, F_c = 1 N; of a friction in proportion to F_c what is fitted is q F_c
+            -q df/dq        of a force; a law that is another for q < 0 is tried with each sign
 
-A constant force is in the balance as F_0: preload, sensor_offset and asymmetric_friction are one with it here. Effects
-of the pressure path, of break-away and of the sensor's dynamics leave no trace in a balance of moving rows.
+A constant is in the balance as F_0: what comes to one, as preload and an asymmetry do here, is none of the terms. What
+holds the stem at rest, the pressure path and the sensor's dynamics leave no trace in a balance of moving rows. Besides
+
+    presliding      z' = 1 / x_f within -1 <= z <= 1: the packing yields over x_f = F_c / k_p before it slips
+
+which is its law solved for the force. Friction stays positive, and a strength in its effect's range.
 
 Each fit is linear least squares within the physical ranges. Of several recordings, each is predicted from the others:
 a pressure or a seal never fitted on. One recording is predicted by fifths, a static curve reading by reading.
@@ -28,8 +24,11 @@ a pressure or a seal never fitted on. One recording is predicted by fifths, a st
                what no such balance explains; a static curve has none, as it passes each place once
 """
 
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
+from functools import cached_property
+from itertools import product
+from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
@@ -38,17 +37,23 @@ from scipy.optimize import lsq_linear
 from config.recording import Column
 from config.results.result import Brief
 from config.valve_file import ValveParameters
-from sim.effect import shipped_effect
-from sim.effects.pressure_power_friction import P_1_PA
+from sim.effect import Effect, shipped_effect, tried_effects
+from sim.interpreted import own_law
 from workbench.data.imposed_motion import Rows
 
 FIFTHS = 5
 YIELDS = (5e-4, 1e-3, 2e-3, 4e-3, 8e-3, 16e-3)
 """Of the travel: over how much of it the packing may yield."""
-SPEEDS = (0.1, 0.3, 1.0)
-"""Of the median speed."""
-EXPONENTS = (0.3, 0.5, 0.7, 1.5, 2.0, 3.0)
-"""Of the pressure."""
+SHAPES: Mapping[str, tuple[float, ...]] = {
+    "velocity_m_per_s": (0.1, 0.3, 1.0),
+    "exponent": (0.3, 0.5, 0.7, 1.5, 2.0, 3.0),
+}
+"""What is tried of a law's shape: velocities, in median speeds, and exponents."""
+PRESLIDING = "presliding"
+SMALL = 1e-6
+"""Of a strength, for the derivative of a law by it."""
+ALONE = 1e-6
+"""Share of a term that no combination of the bare balance's makes up, below which it is none."""
 PLACES = 40
 """Cells of the travel in which a residual's scatter is taken."""
 NORMAL = 1.4826
@@ -83,18 +88,72 @@ class ForceFit(Brief):
 
 
 @dataclass(frozen=True, slots=True)
-class ForceModel:
-    """Which terms a balance has beyond the bare one, and the values of their shapes."""
+class Term:
+    """An effect's law as a column: its strength's name and unit, +1 or -1, and the shape of its law."""
 
-    terms: tuple[str, ...] = ()
+    effect: Effect
+    strength: str
+    unit: float = 1.0
+    shape: tuple[tuple[str, float], ...] = ()
+    of_sign: bool = False
+    """Whether the law is another for a strength of the other sign: then it is of one way, and F_v of the other."""
+
+    @property
+    def name(self) -> str:
+        """The strength's."""
+        return f"{self.effect.name}.{self.strength}"
+
+    @property
+    def is_friction(self) -> bool:
+        """Whether it acts with z."""
+        return "friction" in self.effect.functions
+
+    @property
+    def scales(self) -> bool:
+        """Whether it is in proportion to F_c."""
+        return self.is_friction and not self.effect.parameters[self.strength].scale
+
+    @property
+    def least(self) -> float:
+        """Of the strength in its unit."""
+        return 0.0 if self.effect.parameters[self.strength].least == 0.0 or self.of_sign else -np.inf
+
+    def values(self, rows: Rows) -> Column:
+        """Return what it adds to the force or to the level of friction, N, (rows,), for a strength of one unit."""
+        place = "friction" if self.is_friction else "force"
+        law, named = own_law(self.effect, place), self.effect.functions[place]
+        one = np.ones(len(rows))
+        given = {"x": rows.position_m, "p": rows.pressure_pa, "direction": rows.direction, "F_c": one, "F_s": one}
+        if rows.velocity_m_per_s is not None and rows.time_s is not None:
+            given |= {"t": rows.time_s, "v": rows.velocity_m_per_s}
+        at = [given[each].tolist() for each in named if each != "q"]
+        readings = list(zip(*at, strict=True)) or [()] * len(rows)
+
+        def of(strength: float) -> Column:
+            q = law.parameters(**dict(self.shape), **{self.strength: strength})
+            found = [law.function(*each, q) for each in readings]
+            return np.array([each[0] for each in found] if self.is_friction else found)
+
+        return (of(self.unit * SMALL) - of(0.0)) / SMALL
+
+
+@dataclass(frozen=True, slots=True)
+class ForceModel:
+    """Which terms a balance has beyond the bare one, and over how much the packing yields, m."""
+
+    terms: tuple[Term, ...] = ()
     yield_m: float | None = None
-    speed_m_per_s: float | None = None
-    exponent: float | None = None
 
     @property
     def effects(self) -> tuple[str, ...]:
-        """The effects' names, those with a shape last."""
-        return self.terms if self.yield_m is None else (*self.terms, "presliding")
+        """The effects' names, presliding last."""
+        names = tuple(each.effect.name for each in self.terms)
+        return names if self.yield_m is None else (*names, PRESLIDING)
+
+    @property
+    def free(self) -> int:
+        """Shapes that were chosen."""
+        return (self.yield_m is not None) + sum(len(_chosen(each.effect)) for each in self.terms)
 
 
 @dataclass(frozen=True, slots=True)
@@ -104,38 +163,8 @@ class _Column:
     name: str
     least: float
     values: Column
-
-
-Term = Callable[["Balance", Column, ForceModel], Column]
-
-
-def _pressed(rows: Rows, exponent: float) -> Column:
-    return np.asarray((np.maximum(rows.pressure_pa, 0.0) / P_1_PA) ** exponent)
-
-
-def _share(balance: "Balance") -> Column:
-    return np.clip(balance.rows.position_m / balance.valve.stroke_m, 0.0, 1.0)
-
-
-TERMS: Mapping[str, tuple[str, float, Term]] = {
-    "pressure_friction": ("growth_n_per_pa", 0.0, lambda b, z, _: np.maximum(b.rows.pressure_pa, 0.0) * z),
-    "pressure_power_friction": ("growth_n", 0.0, lambda b, z, m: _pressed(b.rows, m.exponent or 1.0) * z),
-    "position_friction": ("growth_n", -np.inf, lambda b, z, _: _share(b) * z),
-    "friction_drift": ("rate_n_per_s", -np.inf, lambda b, z, _: b.time_s * z),
-    "stribeck": ("excess_n", 0.0, lambda b, z, m: z * np.exp(-((b.velocity / (m.speed_m_per_s or np.inf)) ** 2))),
-    "quadratic_drag": ("drag_ns2_per_m2", 0.0, lambda b, _z, _m: b.velocity * np.abs(b.velocity)),
-    "asymmetric_viscosity": ("extra_ns_per_m", -np.inf, lambda b, _z, _m: 0.5 * np.abs(b.velocity)),
-    "spring_hardening": ("cubic_n_per_m3", 0.0, lambda b, _z, _m: b.rows.position_m**3),
-    "area_variation": ("change_m2", -np.inf, lambda b, _z, _m: -_share(b) * b.rows.pressure_pa),
-}
-FRICTION = ("pressure_friction", "pressure_power_friction", "position_friction", "friction_drift", "stribeck")
-PRESSED = ("pressure_friction", "pressure_power_friction")
-RELATIVE = {
-    "position_friction.growth": "position_friction.growth_n",
-    "friction_drift.rate_per_s": "friction_drift.rate_n_per_s",
-}
-"""Parameters that an effect has as shares of F_c, and what is fitted in their place."""
-NEEDS_MOTION = ("friction_drift", "stribeck", "quadratic_drag", "asymmetric_viscosity", "presliding")
+    added: bool = False
+    """Whether it is a term's, or of what a term hangs on: it stands for nothing else then."""
 
 
 class Balance:
@@ -151,22 +180,53 @@ class Balance:
         self.fold = _folds(rows, tested=tested)
         self.held_out = (self.fold.max(),) if tested else tuple(range(int(self.fold.max()) + 1))
         self._slips: dict[float, Column] = {}
+        self._values: dict[tuple[Any, ...], Column] = {}
 
-    @property
-    def time_s(self) -> Column:
-        """Time since the recording's start, s, (rows,)."""
-        return self.rows.position_m * 0.0 if self.rows.time_s is None else self.rows.time_s
+    @cached_property
+    def library(self) -> dict[str, Effect]:
+        """The effects that rows like these can show, by name."""
+        moved = self.rows.velocity_m_per_s is not None
+        library = {name: shipped_effect(name, "effects") for name in tried_effects()}
+        return {name: each for name, each in library.items() if self._shows(each, moved)} | (
+            {PRESLIDING: library[PRESLIDING]} if moved else {}
+        )
 
-    @property
-    def velocity(self) -> Column:
-        """Velocity, m/s, (rows,); 0 in a static curve."""
-        return self.rows.position_m * 0.0 if self.rows.velocity_m_per_s is None else self.rows.velocity_m_per_s
+    def _shows(self, effect: Effect, moved: bool) -> bool:
+        """Whether an effect is a force or a friction by what these rows have, with one strength, and no constant."""
+        named = {argument for place in effect.places for argument in effect.functions[place]}
+        if effect.memory or {*effect.places} not in ({"force"}, {"friction"}) or (not moved and named & {"t", "v"}):
+            return False
+        strengths = [key for key, each in effect.parameters.items() if each.off == 0.0]
+        if len(strengths) != 1:
+            return False
+        bare = np.column_stack([each.values for each in self.columns(ForceModel())])
+        column = self._column(self._terms(effect)[0], self.rows.direction)
+        left = column - bare @ np.linalg.lstsq(bare, column)[0]
+        return float(np.linalg.norm(left)) > ALONE * float(np.linalg.norm(column))
 
-    @property
-    def names(self) -> tuple[str, ...]:
-        """The effects that rows like these can show."""
-        names = (*TERMS, "presliding")
-        return names if self.rows.velocity_m_per_s is not None else tuple(n for n in names if n not in NEEDS_MOTION)
+    def _terms(self, effect: Effect) -> list[Term]:
+        """Return an effect's law, once for each shape and each sign by which it differs."""
+        (strength,) = (key for key, each in effect.parameters.items() if each.off == 0.0)
+        shapes: dict[str, tuple[float, ...]] = {}
+        for key, declared in effect.parameters.items():
+            if key != strength:
+                tried = SHAPES[key] if key in _chosen(effect) else ()
+                speeds = self.rows.velocity_m_per_s if key == "velocity_m_per_s" else None
+                unit = 1.0 if speeds is None else float(np.median(np.abs(speeds)))
+                shapes[key] = tuple(unit * each for each in tried) or declared.starts_for(self.valve)[:1]
+        found = [Term(effect, strength, 1.0, each) for each in _products(shapes)]
+        if effect.parameters[strength].least < 0.0:
+            one, other = found[0].values(self.rows), replace(found[0], unit=-1.0).values(self.rows)
+            if not np.allclose(one, -other):
+                found = [replace(each, unit=unit, of_sign=True) for each in found for unit in (1.0, -1.0)]
+        return found
+
+    def _column(self, term: Term, z: Column) -> Column:
+        """Return a term as it stands in the balance, (rows,)."""
+        key = term.name, term.unit, term.shape
+        if key not in self._values:
+            self._values[key] = term.values(self.rows)
+        return self._values[key] * z if term.is_friction else -self._values[key]
 
     def friction_state(self, yield_m: float | None) -> Column:
         """Return z, (rows,): the direction, or that of a packing that yields over so many metres before it slips."""
@@ -185,10 +245,11 @@ class Balance:
             _Column("constant_n", -np.inf, np.ones(len(rows))),
         ]
         if rows.velocity_m_per_s is not None:
-            base.append(_Column("viscous_ns_per_m", 0.0, rows.velocity_m_per_s))
+            one_way = any(each.of_sign for each in model.terms)
+            base.append(_Column("viscous_ns_per_m", 0.0, rows.velocity_m_per_s, one_way))
         if rows.load_n is not None:
             base.append(_Column("diaphragm_area_m2", 0.0, -rows.pressure_pa))
-        return [*base, *(_Column(f"{n}.{TERMS[n][0]}", TERMS[n][1], TERMS[n][2](self, z, model)) for n in model.terms)]
+        return [*base, *(_Column(each.name, each.least, self._column(each, z), True) for each in model.terms)]
 
     def fitted(self, model: ForceModel, *, bounded: bool = True) -> ForceFit:
         """Fit a model to all that is fitted, and predict each part from the others."""
@@ -206,21 +267,19 @@ class Balance:
         predicted = np.isfinite(predicted_n)
         train_n = _rms(residual_n[np.isin(self.fold, trained)])
         values = dict(zip([each.name for each in columns], theta.tolist(), strict=True))
-        whole = values | self._shapes(model, values)
+        whole = self._parameters(model, values)
         violations = (
             self._range_violation(columns, reduced, trained, least),
             self._negative_friction(model, values),
-            _negative_viscosity(values),
-            _outside(whole),
+            _outside(model, whole),
         )
         deviations = _jackknife(list(others.values()))
         n = int(np.isin(self.fold, trained).sum())
-        shapes = (model.yield_m, model.speed_m_per_s, model.exponent)
-        free = len(columns) + sum(each is not None for each in shapes)
+        free = len(columns) + model.free
         return ForceFit(
             model.effects,
             whole,
-            {} if deviations is None else dict(zip(values, deviations.tolist(), strict=True)),
+            {} if deviations is None else self._own(model, values, dict(zip(values, deviations.tolist(), strict=True))),
             train_n,
             _rms(predicted_n[predicted]),
             _stroke_logs(self.rows.stroke[predicted], predicted_n[predicted]),
@@ -229,24 +288,30 @@ class Balance:
             next(filter(None, violations), "") if bounded else "",
         )
 
-    def _shapes(self, model: ForceModel, values: Mapping[str, float]) -> dict[str, float]:
-        shapes = {}
+    def _level_n(self, model: ForceModel, values: Mapping[str, float]) -> Column:
+        """Return the sliding friction of a balance, N, (rows,)."""
+        up = np.ones(len(self.rows))
+        return values["coulomb_n"] * up + sum(
+            values[each.name] * self._column(each, up) for each in model.terms if each.is_friction
+        )
+
+    def _parameters(self, model: ForceModel, values: Mapping[str, float]) -> dict[str, float]:
+        """Return what was fitted as the effects' own parameters, with their shapes."""
+        found = self._own(model, values, dict(values))
+        for each in model.terms:
+            found[each.name] *= each.unit
+            found |= {f"{each.effect.name}.{key}": value for key, value in each.shape}
         if model.yield_m is not None:
-            up = np.ones(len(self.rows))
-            terms = [(TERMS[name], values[f"{name}.{TERMS[name][0]}"]) for name in model.terms if name in PRESSED]
-            pressed = sum(float(np.mean(growth * term(self, up, model))) for (_, _, term), growth in terms)
-            shapes["presliding.yield_m"] = model.yield_m
-            shapes["presliding.stiffness_n_per_m"] = (values["coulomb_n"] + pressed) / model.yield_m
-        if model.exponent is not None:
-            shapes["pressure_power_friction.exponent"] = model.exponent
-        if model.speed_m_per_s is not None:
-            shapes["stribeck.velocity_m_per_s"] = model.speed_m_per_s
-        for relative, absolute in RELATIVE.items():
-            if values.get(absolute):
-                # Without any F_c a growth is beyond every share of it.
-                infinite = float(np.copysign(np.inf, values[absolute]))
-                shapes[relative] = values[absolute] / values["coulomb_n"] if values["coulomb_n"] else infinite
-        return shapes
+            found[f"{PRESLIDING}.yield_m"] = model.yield_m
+            found[f"{PRESLIDING}.stiffness_n_per_m"] = float(np.mean(self._level_n(model, values))) / model.yield_m
+        return found
+
+    def _own(self, model: ForceModel, values: Mapping[str, float], fitted: dict[str, float]) -> dict[str, float]:
+        """Return coefficients, or their deviations, as the effects' own: shares of F_c, where that is what they are."""
+        scaled = {each.name for each in model.terms if each.scales}
+        # Without any F_c a growth is beyond every share of it.
+        coulomb_n = values["coulomb_n"] or np.finfo(float).tiny
+        return {name: value / coulomb_n if name in scaled else value for name, value in fitted.items()}
 
     def _range_violation(
         self, columns: list[_Column], reduced: Mapping[int, Matrix], trained: Sequence[int], least: Column
@@ -258,48 +323,39 @@ class Balance:
         deviations = _jackknife(draws)
         for i, each in enumerate(columns):
             spread = 0.0 if deviations is None else float(deviations[i])
-            if "." in each.name and wanted[i] < each.least - OUTSIDE_STANDARD_ERRORS * spread:
+            if each.added and wanted[i] < each.least - OUTSIDE_STANDARD_ERRORS * spread:
                 return f"not physical: the rows want {each.name} below {each.least:g}, the end of its range"
         return ""
 
     def _negative_friction(self, model: ForceModel, values: Mapping[str, float]) -> str:
         """Say if friction comes out negative somewhere; empty if not."""
-        up = np.ones(len(self.rows))
-        level = values["coulomb_n"] * up
-        for name in model.terms:
-            key, _, term = TERMS[name]
-            level = level + values[f"{name}.{key}"] * term(self, up, model) * (name in FRICTION)
+        level = self._level_n(model, values)
         least_n = float(level.min())
         return f"not physical: friction would fall to {least_n:.3g} N" if least_n < -1e-9 * level.max() else ""
 
     def candidates(self, before: ForceModel, name: str) -> list[ForceModel]:
         """Return the models that add an effect, one a value of its shape."""
-        travel_m = float(np.ptp(self.rows.position_m))
-        if name == "presliding":
+        if name == PRESLIDING:
+            travel_m = float(np.ptp(self.rows.position_m))
             return [replace(before, yield_m=share * travel_m) for share in YIELDS]
-        extended = replace(before, terms=(*before.terms, name))
-        if name == "pressure_power_friction":
-            return [replace(extended, exponent=each) for each in EXPONENTS]
-        if name != "stribeck":
-            return [extended]
-        middle = float(np.median(np.abs(self.velocity)))
-        return [replace(extended, speed_m_per_s=share * middle) for share in SPEEDS]
+        return [replace(before, terms=(*before.terms, each)) for each in self._terms(self.library[name])]
 
 
-def _negative_viscosity(values: Mapping[str, float]) -> str:
-    """Say if viscous friction comes out negative one way; empty if not."""
-    half = 0.5 * abs(values.get("asymmetric_viscosity.extra_ns_per_m", 0.0))
-    least = values.get("viscous_ns_per_m", 0.0) - half
-    return f"not physical: viscous friction would be {least:.3g} N s/m one way" if half and least < 0.0 else ""
+def _chosen(effect: Effect) -> list[str]:
+    """Return the parameters of an effect's law that are chosen by trials."""
+    return [key for key, each in effect.parameters.items() if key in SHAPES and len(each.starts) > 1]
 
 
-def _outside(values: Mapping[str, float]) -> str:
-    """Say which parameter lies outside the range that its effect declares; empty if none."""
-    for name, value in values.items():
-        effect, _, key = name.partition(".")
-        declared = shipped_effect(effect, "effects").parameters.get(key) if key else None
-        if declared and not declared.least <= value <= declared.most:
-            return f"not physical: {name} = {value:.4g}, allowed are {declared.least:g} to {declared.most:g}"
+def _products(shapes: Mapping[str, tuple[float, ...]]) -> list[tuple[tuple[str, float], ...]]:
+    return [tuple(zip(shapes, values, strict=True)) for values in product(*shapes.values())]
+
+
+def _outside(model: ForceModel, values: Mapping[str, float]) -> str:
+    """Say which strength lies outside the range that its effect declares; empty if none."""
+    for each in model.terms:
+        declared, value = each.effect.parameters[each.strength], values[each.name]
+        if not declared.least <= value <= declared.most:
+            return f"not physical: {each.name} = {value:.4g}, allowed are {declared.least:g} to {declared.most:g}"
     return ""
 
 

@@ -18,7 +18,7 @@ from config.recording import Recording
 from config.results.block import Block, Table
 from config.results.result import Result
 from config.valve_file import ValveFile
-from sim.effect import Effect, shipped_effect
+from sim.effect import Effect
 from workbench.data.imposed_motion import Rows, rows_of
 from workbench.diagnosis.verdict import Verdict
 from workbench.diagnosis.verdict_sentence import rivals_sentence, verdict_line
@@ -119,11 +119,11 @@ def diagnose_forces(
 def _searched(balance: Balance) -> ForceDiagnosis:
     here = ForceModel()
     base = fit = balance.fitted(here)
-    library = {name: shipped_effect(name, "effects") for name in balance.names}
+    library = balance.library
     steps: list[ForceStep] = []
     while True:
         floor_n = floor_of(balance.rows, fit.residual_n)
-        found = {name: _best(balance, here, name) for name in balance.names if _is_new(name, here.effects, library)}
+        found = {name: _best(balance, here, name) for name in library if _is_new(name, here.effects, library)}
         step = _step(len(steps) + 1, fit, {name: fitted for name, (_, fitted) in found.items()}, library)
         if steps:
             steps[-1] = without_missing(steps[-1], step, library)
