@@ -496,6 +496,34 @@ def equilibrium(valve: Karnopp, command: float, stem: Stem, q: Any, z: Any) -> f
     return min(max(command, (middle - closing) / valve.A), (middle + opening) / valve.A)
 
 
+def follow(
+    valve: Karnopp,
+    drive: Drive,
+    s: float,
+    x: float,
+    v: float,
+    p: float,
+    mode: int,
+    sigma: float,
+    tolerance: float,
+    held: bool,
+    q: Any,
+    z: Any,
+) -> tuple[float, float, int, float, float]:
+    """Carry stem, memories and sensor over s (s), in which the pressure goes straight, to p; return x, v, mode, sigma
+    and the indicated position at its end. A stem that is held stays once it is stuck.
+    """
+    x0 = x
+    x, v, mode, sigma = step(valve, drive, s, x, v, mode, sigma, tolerance, held, q, z)
+    x, v = settle(valve, Stem(drive.t + s, x, v, p), q, z)
+    if v == 0.0:
+        mode = STUCK
+    stem = Stem(drive.t + s, x, v, p)
+    remember(x0, s, stem, q, z)
+    _, indicated = sensor(x0, x, s, stem, q, z)
+    return x, v, mode, sigma, indicated
+
+
 def carry(
     valve: Karnopp,
     now: Condition,
@@ -513,16 +541,10 @@ def carry(
     for i in range(n):
         t0, left = t + i * h, h
         while True:
-            x0 = x
             _, s = straight(command, left, Stem(t0, x, v, p), q, z)
             p0, p = pressure(command, command, s, Stem(t0, x, v, p), q, z)
-            x, v, mode, sigma = step(valve, Drive(t0, p0, (p - p0) / s), s, x, v, mode, sigma, tolerance, False, q, z)
-            x, v = settle(valve, Stem(t0 + s, x, v, p), q, z)
-            if v == 0.0:
-                mode = STUCK
-            stem = Stem(t0 + s, x, v, p)
-            remember(x0, s, stem, q, z)
-            _, indicated = sensor(x0, x, s, stem, q, z)
+            drive = Drive(t0, p0, (p - p0) / s)
+            x, v, mode, sigma, indicated = follow(valve, drive, s, x, v, p, mode, sigma, tolerance, False, q, z)
             if not s < left:  # nothing cuts a step: LLVM then sees that there is no loop
                 break
             t0 += s

@@ -32,14 +32,11 @@ from sim.karnopp import (
     Vector,
     excess,
     external_force,
+    follow,
     friction,
     karnopp,
     pressure,
     read,
-    remember,
-    sensor,
-    settle,
-    step,
     straight,
     unknown,
     write,
@@ -130,29 +127,22 @@ def carried(
     for i in range(n):
         t0, left = t + i * h, h
         while left > 0.0:
-            x0 = x
             there = seen + seen_rate * (t0 - t) if fed else x
             _, s = straight(command, left, Stem(t0, there, v, p), q, z)
             p0, p = pressure(command, command, s, Stem(t0, there, v, p), q, z)
             rested = mode == STUCK
             if rested or abs(x - place) <= blur:
                 most = max(most, load(valve, Stem(t0, x, 0.0, p0), blur, q, z))
-            law = free if fast > 0.0 else valve
-            x, v, mode, sigma = step(law, Drive(t0, p0, (p - p0) / s), s, x, v, mode, sigma, tolerance, held, q, z)
-            x, v = settle(valve, Stem(t0 + s, x, v, p), q, z)
-            if v == 0.0:
-                mode = STUCK
+            law, drive = free if fast > 0.0 else valve, Drive(t0, p0, (p - p0) / s)
+            x, v, mode, sigma, indicated = follow(law, drive, s, x, v, p, mode, sigma, tolerance, held, q, z)
             if mode == STUCK:
                 fast = 0.0
             elif abs(v) > FAST * valve.v_s:
                 fast = 1.0
             t0 += s
             left -= s
-            stem = Stem(t0, x, v, p)
             if mode == STUCK and held and not (rested and p == p0):
-                most = max(most, load(valve, stem, blur, q, z))
-            remember(x0, s, stem, q, z)
-            _, indicated = sensor(x0, x, s, stem, q, z)
+                most = max(most, load(valve, Stem(t0, x, v, p), blur, q, z))
     off = unknown(sigma + excess(valve, Stem(t + duration, x, v, p), q, z))
     return Told(Condition(t + duration, x + off, v, p, mode, sigma, indicated + off), most, fast)
 

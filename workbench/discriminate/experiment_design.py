@@ -8,8 +8,8 @@ A valve A answers a course, under a pressure noise that makes it repeat itself n
 and its rival B are refitted to the answer by one Gauss-Newton step, each held to what the recordings so far say of its
 parameters z:
 
-    dz = argmin |r + J dz|^2 + dz' H dz,   e = r + J dz     r residuals, told when the stem moves; H = J' J over the
-                                                            recordings
+    dz = argmin |r + J dz|^2 + dz' H dz,   e = r + J dz     r residuals, told when the stem moves; H over the recordings
+                                                            so far, by `Fit.known`
     separation = C(e_B) / C(e_A)     C soft-L1 cost; both ways in the geometric mean, least of all pairs told apart
     sigma_p = k_s / A sqrt(sigma^2 - sigma_sensor^2)     of the noise, an autoregression of 0.2 s; sigma floor
 
@@ -318,8 +318,9 @@ class Rivalry:
 
     @cached_property
     def _information(self) -> list[NDArray[np.float64]]:
-        """H of each rival."""
-        return [self._known(i) for i in range(len(self._compositions))]
+        """H of each rival: what the recordings so far say of its parameters, and that none is off by a factor of e."""
+        roots = [each.known.root for each in self._fits]
+        return [root.T @ root + np.eye(len(root)) for root in roots]
 
     def stepped(self, course: Course) -> Vector | None:
         """Return the log separation of each pair after one step, (pairs,); None where the stem leaves its window."""
@@ -379,13 +380,6 @@ class Rivalry:
     def _like(self, i: int, record: Record) -> Likelihood:
         fit = self._fits[i]
         return problem_of(fit, record).likelihood(self._compositions[i], tuple(fit.parameters))
-
-    def _known(self, i: int) -> NDArray[np.float64]:
-        """Return H of a rival: what the recordings so far say of its parameters, in units of the sensor's noise."""
-        like, theta = self._like(i, self._record), self._compositions[i].theta
-        onsets_s, _ = with_onsets(like, theta)
-        J = derivatives(like, like.coordinates(theta), onsets_s)[:, : len(like.parameters)]
-        return np.asarray(J.T @ J + np.eye(J.shape[1]))
 
     def _after_step(self, answer: Record, j: int) -> float:
         """Return C after one step, the onsets as they suit the valve."""
