@@ -159,6 +159,7 @@ class Likelihood:
         self.sigma_m = record.scale_m
         self.landing_m = self.sigma_m * np.sqrt(1.0 / self.layout.per_rest + weights.landing**2)
         self._last: tuple[bytes, Groups] | None = None
+        self._quantum = next((i for i, each in enumerate(_guesses(composition)) if each == "quantum"), None)
         self.broken = np.array([k for k, each in enumerate(told) if not each.begins_in_motion], dtype=np.int64)
 
     @property
@@ -187,17 +188,17 @@ class Likelihood:
         """Simulate; return the residuals. Those asked for last are kept: a minimiser asks again for derivatives."""
         asked = theta.tobytes() + onsets_s.tobytes()
         if self._last is None or self._last[0] != asked:
-            self._last = asked, self.of_path(self.run.run(theta, onsets_s), theta)
+            smooth = theta if self._quantum is None else np.where(np.arange(theta.size) == self._quantum, 0.0, theta)
+            self._last = asked, self.of_path(self.run.run(smooth, onsets_s), theta)
         return self._last[1]
 
     def of_path(self, path: ToldPath, theta: Vector) -> Groups:
         """Return the residuals of a path."""
         most = self.weights.wild
         rows = self.layout
-        e = np.nan_to_num(
-            (path.indicated_m - self.record.position_m) / self.sigma_m, nan=most, posinf=most, neginf=-most
-        )
-        e = np.clip(e, -most, most)
+        quantum_m = 0.0 if self._quantum is None else float(theta[self._quantum])
+        off_m = off_by(path.indicated_m, self.record.position_m, quantum_m, self.weights.landing)
+        e = np.clip(np.nan_to_num(off_m / self.sigma_m, nan=most, posinf=most, neginf=-most), -most, most)
         sums = np.add.reduceat(e[rows.resting], rows.starts) if rows.starts.size else np.empty(0)
         mean = np.bincount(rows.rest_of, sums) / rows.per_rest
         blocks = (sums / rows.count - mean[rows.rest_of]) * np.sqrt(rows.count)
@@ -213,6 +214,25 @@ class Likelihood:
         breaks = np.where(breaks > 0.0, breaks, np.inf)  # it slides on where the record rests: nothing breaks loose
         off = np.maximum(np.maximum(bears - F_s, F_s - breaks), 0.0) / self.load_n
         return np.clip(np.nan_to_num(off, nan=self.weights.wild), 0.0, self.weights.wild)
+
+
+def off_by(simulated_m: Vector, measured_m: Vector, quantum_m: float, tolerance: float) -> Vector:
+    """Return e, m, (n,), of what is simulated, before its sensor rounds it: a reading L says x in [L - q/2, L + q/2].
+
+    Outside, e grows with the distance over a tolerance, to what the rounded position is off by at the most.
+    """
+    if not quantum_m > 0.0:
+        return simulated_m - measured_m
+    level_m, rounded_m = (quantum_m * np.floor(each / quantum_m + 0.5) for each in (measured_m, simulated_m))
+    beyond_m = simulated_m - np.clip(simulated_m, level_m - 0.5 * quantum_m, level_m + 0.5 * quantum_m)
+    most_m = np.abs(rounded_m - level_m)
+    return level_m - measured_m + np.clip(beyond_m / tolerance, -most_m, most_m)
+
+
+def _guesses(composition: Composition) -> list[str]:
+    """Return what a record suggests for each parameter, in the order of theta; the bare valve's: nothing."""
+    declared = [each.guess for effect in composition.effects for each in effect.parameters.values()]
+    return [""] * (composition.theta.size - len(declared)) + declared
 
 
 def with_static(like: Likelihood, theta: Vector, path: ToldPath) -> Vector:
