@@ -187,7 +187,7 @@ def fit_at(problem: Problem, like: Likelihood, end: End, agreement: int) -> Fit:
     determined = uncertainty(like, end)
     end, record = _as_runs_freely(like, end, determined), problem.record
     theta = like.theta(end.z)
-    error_m = like.run.run(theta, end.onsets_s).indicated_m - record.position_m
+    error_m = like.off_m(like.path(theta, end.onsets_s), theta)
     return Fit(
         valve=like.composition.file(theta),
         parameters={each.name: _fitted(like, end, determined, i) for i, each in enumerate(like.parameters)},

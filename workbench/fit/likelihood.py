@@ -8,8 +8,9 @@ First factor. A simulation is told the moves (`workbench.model.told_run`). With 
     r_l = mean(e) / sqrt(sigma^2 / n + tau^2)       a rest of n samples: where the slide landed
     r_b = (mean_b(e) - mean(e)) sqrt(n_b) / sigma   blocks b of n_b samples of it: what still creeps there
 
-sigma the noise, tau = `landing` sigma. Second factor. F_s lies between L_bears, what a rest bore, and L_breaks, what
-broke it loose:
+sigma the noise, tau = `landing` sigma. Where the sensor of the model rounds to q, a reading L says that x was within
+L - q/2 and L + q/2: e is L - measured there, and grows by the distance over `landing` outside (`off_by`). Second
+factor. F_s lies between L_bears, what a rest bore, and L_breaks, what broke it loose:
 
     r_k = max(L_bears - F_s, F_s - L_breaks, 0) / L_0     L_0 = `break_away` k_s sigma, k_s as on the data sheet
 
@@ -188,17 +189,25 @@ class Likelihood:
         """Simulate; return the residuals. Those asked for last are kept: a minimiser asks again for derivatives."""
         asked = theta.tobytes() + onsets_s.tobytes()
         if self._last is None or self._last[0] != asked:
-            smooth = theta if self._quantum is None else np.where(np.arange(theta.size) == self._quantum, 0.0, theta)
-            self._last = asked, self.of_path(self.run.run(smooth, onsets_s), theta)
+            self._last = asked, self.of_path(self.path(theta, onsets_s), theta)
         return self._last[1]
+
+    def path(self, theta: Vector, onsets_s: Vector) -> ToldPath:
+        """Simulate, the sensor's rounding left out."""
+        rounds = np.arange(theta.size) == (-1 if self._quantum is None else self._quantum)
+        return self.run.run(np.where(rounds, 0.0, theta), onsets_s)
+
+    def off_m(self, path: ToldPath, theta: Vector) -> Vector:
+        """Return what a path is off by, m, (n,)."""
+        quantum_m = 0.0 if self._quantum is None else float(theta[self._quantum])
+        return off_by(path.indicated_m, self.record.position_m, quantum_m, self.weights.landing)
 
     def of_path(self, path: ToldPath, theta: Vector) -> Groups:
         """Return the residuals of a path."""
         most = self.weights.wild
         rows = self.layout
-        quantum_m = 0.0 if self._quantum is None else float(theta[self._quantum])
-        off_m = off_by(path.indicated_m, self.record.position_m, quantum_m, self.weights.landing)
-        e = np.clip(np.nan_to_num(off_m / self.sigma_m, nan=most, posinf=most, neginf=-most), -most, most)
+        e = self.off_m(path, theta) / self.sigma_m
+        e = np.clip(np.nan_to_num(e, nan=most, posinf=most, neginf=-most), -most, most)
         sums = np.add.reduceat(e[rows.resting], rows.starts) if rows.starts.size else np.empty(0)
         mean = np.bincount(rows.rest_of, sums) / rows.per_rest
         blocks = (sums / rows.count - mean[rows.rest_of]) * np.sqrt(rows.count)

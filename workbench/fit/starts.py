@@ -91,7 +91,7 @@ def _likeliest(like: Likelihood, thetas: Iterable[Vector], onsets_s: Vector) -> 
 
 
 def _at_its_static(like: Likelihood, theta: Vector, onsets_s: Vector) -> tuple[Vector, Groups]:
-    path = like.run.run(theta, onsets_s)
+    path = like.path(theta, onsets_s)
     there = with_static(like, theta, path)
     return there, like.of_path(path, there)
 

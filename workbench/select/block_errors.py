@@ -165,8 +165,9 @@ def _likelihood(fit: Fit, part: Part) -> tuple[Likelihood, Vector]:
 
 
 def _at(like: Likelihood, part: Part, theta: Vector, onsets_s: Vector, moved: Vector) -> _Told:
-    path = like.run.run(theta, onsets_s)
-    return _Told(like, like.of_path(path, theta), residual_m(part, path.indicated_m), moved)
+    path = like.path(theta, onsets_s)
+    off_m = like.off_m(path, theta)
+    return _Told(like, like.of_path(path, theta), residual_m(part, part.record.position_m + off_m), moved)
 
 
 def _counted(like: Likelihood, part: Part) -> list[bool]:
