@@ -261,7 +261,7 @@ class Refusal(Code):
 class Sampling(Code):
     """When a device samples, as an identification has found it out (`[device] sampling`)."""
 
-    UNKNOWN = 0, "not found out"
+    UNKNOWN = 0, "not found out, or neither: a device on its own clock"
     BEFORE = 1, "before: a reply shows the pressure that has acted until then"
     AFTER = 2, "after: a reply shows the pressure that acts from then on"
 

@@ -32,6 +32,9 @@ to the next, Δu = α + β x where the motion has settled,
 
     var(b/c) += (β/2)^2,    var(k/c) += (α/2)^2
 
+and when the jump acted that began a motion is known to half a sample, too. a, b, c and k hang on that: half of what
+they differ by between the two conventions, which are a sample apart, is open.
+
 Break-away: F_s/A lies between the largest force at which the stem rested and the force at which it left,
 both u + (b/c) x in the direction of the motion. A held pressure jumps from one to the other; several events leave what
 their intervals share (`breakaway_force`).
@@ -181,7 +184,7 @@ def identify(
     told_apart = all(_clearly_better(best.fit, each) for each in others)
     drifting = _fitted_beside(best, Beside.DRIFT, prior)
     as_likely = [each for each in others if settings.sampling and not _clearly_better(best.fit, each)]
-    open_std = np.hypot(_open_std(best.fit, [*as_likely, drifting]), _open_by_instants(best, settings))
+    open_std = np.hypot(_open_std(best.fit, [*as_likely, drifting]), _open_by_instants(best, others, settings))
     stamps_s = even_s if best.evened and even_s is not None else t
     contradicted = _contradicted(best, stamps_s, x, noise_std_m, settings)
     together = _refusal_of_all(best, drifting, noise_std_m, settings)
@@ -233,9 +236,12 @@ def _open_std(fit: LikelihoodFit, others: list[LikelihoodFit | None]) -> Array:
     return np.asarray(np.sqrt(np.maximum(variance, 0.0)))
 
 
-def _open_by_instants(best: "_Hypothesis", settings: BatchSettings) -> Array:
+def _open_by_instants(best: "_Hypothesis", others: list[LikelihoodFit | None], settings: BatchSettings) -> Array:
     """Return by how much θ of a device's samples is open, (6,), whose commands act somewhere between two of them."""
     open_std = np.zeros(6)
+    if settings.sampling and best.fit is not None:
+        apart = [np.abs(each.theta[:4] - best.fit.theta[:4]) for each in others if each is not None]
+        open_std[:4] = INSTANT * np.max([open_std[:4], *apart], axis=0)
     settled = [each for each in _settled(best) if len(each.time_s) > 2]
     if settings.sampling and settled:
         x = np.concatenate([each.position_m[1:] for each in settled])
