@@ -1,8 +1,10 @@
 """The calibration of the loops' evidence: `python -m benchmarks.loops [--drawn N] [--data FOLDER]`.
 
-It prints what `workbench.loops.calibration` and `LIMITS.least_interval` hold, from N drawn loops of the seeds from 1000
-on and from FOLDER, loops of others with labels (`positioner bench --labelled`), each set counted as much as the other;
-and how long a day at one sample a second takes. How often a verdict is right on other loops says `positioner bench`.
+It prints what `workbench.loops.calibration`, `LIMITS.sticks_probability` and `LIMITS.least_interval` hold: three
+numbers from N drawn loops of the seeds from 1000 on, and the threshold from N others of the seeds from 2000 on. Of
+FOLDER, loops of others with labels (`positioner bench --labelled`), none calibrates anything: it prints how well they
+are told. How often a verdict is right on further loops says `positioner bench`. Last comes how long a day at one sample
+a second takes.
 """
 
 import argparse
@@ -11,7 +13,6 @@ import time
 from collections.abc import Iterator, Sequence
 from concurrent.futures import ProcessPoolExecutor
 from dataclasses import dataclass
-from itertools import product
 from pathlib import Path
 
 import numpy as np
@@ -19,11 +20,14 @@ import numpy as np
 from workbench.bench.cases import Case, read_cases, write_cases
 from workbench.bench.drawn_loops import Array, draw_loop
 from workbench.bench.methods import evidence_of, loop_records
+from workbench.bench.scores import area
 from workbench.loops import LoopRecord, diagnose_loop
-from workbench.loops.calibration import Evidence, calibrate
+from workbench.loops.calibration import Calibration, Evidence, calibrate
 from workbench.loops.thresholds import LIMITS
 
-CALIBRATION_SEEDS = 1000
+NUMBERS, THRESHOLD = 1000, 2000
+"""First seeds of the loops that the three numbers and the threshold are from."""
+MOST_WRONG = 0.05
 DAY = 86_400
 
 
@@ -33,7 +37,6 @@ class Told:
 
     evidence: Evidence
     sticks: bool
-    drawn: bool
     judged: bool
     size_ratio: float | None
 
@@ -44,44 +47,48 @@ def tell(case: Case) -> Told | None:
         return None
     friction = said[0].causes.friction if said[0].causes else None
     ratio = friction.stiction_pct / case.stiction_pct if friction and case.stiction_pct else None
-    judged = any(each.causes for each in said)
-    return Told(evidence_of(said), case.truth == "1", case.set == "drawn", judged, ratio)
+    return Told(evidence_of(said), case.truth == "1", any(each.causes for each in said), ratio)
 
 
-def calibration(told: Sequence[Told]) -> Iterator[str]:
-    """Yield what the calibration is, and how often it is wrong."""
-    drawn = [each for each in told if each.drawn and each.judged]
-    plants = [each for each in told if not each.drawn]
-    weights = np.concatenate([np.full(len(drawn), max(1, len(plants)) / len(drawn)), np.ones(len(plants))])
-    loops, truth = [each.evidence for each in drawn + plants], np.array([float(e.sticks) for e in drawn + plants])
-    fitted = calibrate(loops, truth, weights)
-    yield f"{len(drawn)} drawn loops, {len(plants)} labelled: {fitted}"
-    probability = np.array([fitted.probability(each.evidence) for each in drawn])
-    for least in (0.8, 0.85, 0.9, 0.92, 0.95, 0.97):
-        called = probability >= least
-        yield f"  at {least:g}: called {called.sum()}, wrong {int((called & (truth[: len(drawn)] == 0.0)).sum())}"
-    off = [
-        abs(np.log(each.size_ratio))
-        for each, p in zip(drawn, probability, strict=True)
-        if p >= LIMITS.sticks_probability and each.size_ratio
-    ]
-    yield f"  95 % of those called lie within {np.quantile(off, 0.95):.3f} in logarithm" if off else "  none called"
-    if plants:
-        yield f"  labelled, by pairs left out: AUC {of_pairs(loops, truth, weights, len(drawn)):.2f}"
+def told_of(pool: ProcessPoolExecutor, drawn: int, first_seed: int, labelled: Path | None) -> list[Told]:
+    with tempfile.TemporaryDirectory() as folder:
+        write_cases(Path(folder), drawn, 0, first_seed, labelled)
+        return [each for each in pool.map(tell, read_cases(Path(folder)), chunksize=4) if each]
 
 
-def of_pairs(told: Sequence[Evidence], truth: Array, weights: Array, first: int) -> float:
-    """Return how often, of a sticking and another labelled loop, the first has more, calibrated without the two.
+def scored(told: Sequence[Told], by: Calibration) -> tuple[Array, np.ndarray]:
+    return np.array([by.probability(each.evidence) for each in told]), np.array([each.sticks for each in told])
 
-    Left out one by one they would be judged by two calibrations, that of a sticking loop with fewer that stick.
-    """
-    wins = []
-    for ours, other in product(*((first + np.flatnonzero(truth[first:] == which)).tolist() for which in (1.0, 0.0))):
-        kept = np.setdiff1d(np.arange(truth.size), (ours, other))
-        fitted = calibrate([told[at] for at in kept.tolist()], truth[kept], weights[kept])
-        a, b = fitted.probability(told[ours]), fitted.probability(told[other])
-        wins.append((a > b) + 0.5 * (a == b))
-    return float(np.mean(wins))
+
+def threshold(told: Sequence[Told], by: Calibration) -> float:
+    """Return the least p from which on (1 + wrong) / called is at most 5 %: conformal selection."""
+    scores, sticks = scored(told, by)
+    kept = 1.0
+    for score in sorted(scores, reverse=True):
+        called = scores >= score
+        if (1 + (called & ~sticks).sum()) / called.sum() <= MOST_WRONG:
+            kept = float(score)
+    return kept
+
+
+def counted(said: np.ndarray, wrong: np.ndarray) -> str:
+    return f"{said.sum()} said so, {(said & wrong).sum()} wrong"
+
+
+def calibration(numbers: Sequence[Told], others: Sequence[Told], labelled: Sequence[Told]) -> Iterator[str]:
+    """Yield what the calibration is, and how well it tells loops that it was not made from."""
+    fitted = calibrate([e.evidence for e in numbers], np.array([float(e.sticks) for e in numbers]))
+    least = threshold(others, fitted)
+    scores, sticks = scored(others, fitted)
+    yield f"{len(numbers)} drawn loops: {fitted}"
+    yield f"{len(others)} others: AUC {area(scores, sticks):.3f}"
+    yield f"from {least:.3f} on: {counted(scores >= least, ~sticks)}"
+    yield f"below {LIMITS.other_probability:g}: {counted(scores < LIMITS.other_probability, sticks)}"
+    off = [abs(np.log(e.size_ratio)) for e, p in zip(others, scores, strict=True) if p >= least and e.size_ratio]
+    yield f"95 % of those called lie within {np.quantile(off, 0.95):.3f} in logarithm" if off else "none called"
+    if labelled:
+        scores, sticks = scored(labelled, fitted)
+        yield f"{len(labelled)} labelled: AUC {area(scores, sticks):.3f}, {counted(scores >= least, ~sticks)}"
 
 
 def of_a_day() -> str:
@@ -104,11 +111,13 @@ def main() -> None:
     parser.add_argument("--drawn", type=int, default=300, metavar="N")
     parser.add_argument("--data", type=Path, metavar="FOLDER")
     arguments = parser.parse_args()
-    with tempfile.TemporaryDirectory() as folder:
-        write_cases(Path(folder), arguments.drawn, 0, CALIBRATION_SEEDS, arguments.data)
-        with ProcessPoolExecutor() as pool:
-            told = list(pool.map(tell, read_cases(Path(folder)), chunksize=4))
-    print(*calibration([each for each in told if each]), of_a_day(), sep="\n")
+    with ProcessPoolExecutor() as pool:
+        numbers, others = (
+            [each for each in told_of(pool, arguments.drawn, seed, None) if each.judged]
+            for seed in (NUMBERS, THRESHOLD)
+        )
+        labelled = told_of(pool, 0, 0, arguments.data) if arguments.data else []
+    print(*calibration(numbers, others, labelled), of_a_day(), sep="\n")
 
 
 if __name__ == "__main__":

@@ -6,7 +6,7 @@ from collections.abc import Sequence
 import numpy as np
 import numpy.typing as npt
 
-from workbench.imports.export_units import unit_named
+from workbench.imports.export_units import PROCESS_UNITS, unit_named
 from workbench.imports.number_notation import is_numeral, number
 from workbench.imports.raw_table import Cell
 
@@ -30,9 +30,20 @@ def parted(cell: str) -> tuple[str, str | None]:
     return (match[1], unit) if match and unit else (cell, None)
 
 
+def with_any_unit(cell: str) -> tuple[str, str]:
+    """Return the numeral of a cell and the unit behind it, ours or a process's; "" where none stands there.
+
+    >>> with_any_unit("12.3 m³/h"), with_any_unit("949 mbar"), with_any_unit("Bad Input")
+    (('12.3', 'm³/h'), ('949', 'mbar'), ('Bad Input', ''))
+    """
+    numeral, unit = parted(cell)
+    match = None if unit or is_numeral(cell) else _WITH_UNIT.fullmatch(cell)
+    return (match[1], match[2]) if match and PROCESS_UNITS.fullmatch(match[2]) else (numeral, unit or "")
+
+
 def numbers_of(cells: Sequence[Cell], decimal: str) -> npt.NDArray[np.float64]:
     """Return the numbers of some cells, NaN for words, whatever unit stands behind them."""
-    found = [cell if isinstance(cell, float) else number(parted(cell)[0], decimal) for cell in cells]
+    found = [cell if isinstance(cell, float) else number(with_any_unit(cell)[0], decimal) for cell in cells]
     return np.array([np.nan if each is None else each for each in found])
 
 

@@ -91,7 +91,13 @@ def time_base(times: Column) -> TimeBase | None:
 
 
 def clock_of(
-    path: Path, samples: Samples, theirs: str, mapped: str | None, time_format: str | None, decimal: str
+    path: Path,
+    samples: Samples,
+    theirs: str,
+    mapped: str | None,
+    time_format: str | None,
+    decimal: str,
+    option: str = "--column time_s=",
 ) -> Clock:
     """Return when the rows are.
 
@@ -102,6 +108,7 @@ def clock_of(
         mapped: its unit as a person says it.
         time_format: how stamps are written, None: ISO 8601.
         decimal: the decimal sign.
+        option: by which a person names it and its unit.
 
     Raises:
         InputError: a row without a time, or a time that is none; says what to type.
@@ -132,7 +139,7 @@ def clock_of(
         return Clock(raw * UNITS["_s"][unit], None)
     if base.unit != unit and (said is None or abs(raw[0]) > SURELY):
         problem = f"{cells[0]!r} in {theirs!r} is no time in {'seconds' if unit == 's' else unit}"
-        raise InputError(str(path), f"{problem}: type --column time_s={theirs}:{base.unit}, {base.words}")
+        raise InputError(str(path), f"{problem}: type {option}{theirs}:{base.unit}, {base.words}")
     factor = UNITS["_s"][unit]
     if base.unit != unit:
         return Clock(raw * factor, None)

@@ -11,7 +11,7 @@ from itertools import islice
 from pathlib import Path
 
 from config.errors import InputError
-from workbench.imports.cell_kinds import parted
+from workbench.imports.cell_kinds import parted, with_any_unit
 from workbench.imports.clock_groups import clock_places, signal_places
 from workbench.imports.column_names import STATUS, rank_by_name
 from workbench.imports.header_search import Header, guess_header
@@ -50,7 +50,7 @@ class ColumnPreview:
     def numbers(self) -> bool:
         """Whether its cells are numbers, with a unit behind them or none, but for some words."""
         found = [cell for cell in self.cells if cell != ""]
-        numbers = sum(isinstance(cell, float) or is_numeral(parted(cell)[0]) for cell in found)
+        numbers = sum(isinstance(cell, float) or is_numeral(with_any_unit(cell)[0]) for cell in found)
         return bool(found) and numbers > len(found) / 2
 
     @property
@@ -83,7 +83,7 @@ def shown(cell: Cell) -> str:
 
 def shown_decimal(columns: Sequence[ColumnPreview], separator: str) -> tuple[str, str]:
     """Return the decimal sign that some columns show, and what a person must say where they leave it open."""
-    texts = [parted(cell)[0] for each in columns if each.numbers for cell in each.cells if isinstance(cell, str)]
+    texts = [with_any_unit(cell)[0] for each in columns if each.numbers for cell in each.cells if isinstance(cell, str)]
     try:
         return decimal_sign("", texts, separator), ""
     except InputError as error:

@@ -22,7 +22,7 @@ import numpy as np
 import numpy.typing as npt
 
 from workbench.imports.column_names import COMMON, PROCESS_VALUE, SETPOINT, is_called, rank_by_name, taken_apart
-from workbench.imports.export_units import SHARES, UNITS
+from workbench.imports.export_units import PROCESS_UNITS, SHARES, UNITS
 
 Array = npt.NDArray[np.float64]
 OUTPUT = COMMON["command_pa"][0]
@@ -30,11 +30,6 @@ CONTROLLER = re.compile(r"\b[FLPTAQWDS][DFIQRY]*C[A-Z]*[ -]?\d", re.IGNORECASE)
 """Tags of controllers by ISA-5.1: measured quantity, functions, C."""
 OF_VALVE = re.compile(r"\b[FLPTHX]C?V[ -]?\d", re.IGNORECASE)
 """Tags of valves."""
-PROCESS_UNITS = re.compile(
-    r"(n?m[3³]|l|kg|t|lb|gal|bbl)/(h|hr|min|s|d)\b|\bgpm\b|\bs?cfm\b|\b[lk]pm\b|°[cf]\b|\bdeg ?[cfk]\b|"
-    r"\bph\b|\bm[3³]\b",
-    re.IGNORECASE,
-)
 LEAST_SHARE, MOST_SHARE = -10.0, 110.0
 """An output in %, and with it one in mA or of 1."""
 OUTPUT_IS_SETPOINT = 1e-3
@@ -120,7 +115,7 @@ def _tag(name: str, role: str) -> str:
     """Return what is left of a name without the words for what it is."""
     words = {"setpoint": SETPOINT, "output": OUTPUT, "process_value": PROCESS_VALUE}[role]
     left = re.sub(rf"(?:{words})\w*|\bvalue\b|[\[(<].*$", " ", taken_apart(name), flags=re.IGNORECASE)
-    return " ".join(re.sub(r"%|\S+/\S+", " ", left).split())
+    return " ".join(re.sub(rf"%|/|{PROCESS_UNITS.pattern}", " ", left, flags=re.IGNORECASE).split())
 
 
 def _of_no_tag(groups: Mapping[str, Mapping[str, LoopColumn]]) -> dict[str, dict[str, LoopColumn]]:

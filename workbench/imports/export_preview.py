@@ -5,7 +5,7 @@ from dataclasses import dataclass
 from pathlib import Path
 
 from config.results.block import Block, Table, as_text
-from workbench.imports.cell_kinds import numbers_of
+from workbench.imports.cell_kinds import numbers_of, with_any_unit
 from workbench.imports.column_preview import ColumnPreview, columns_of, columns_of_all, guessed, shown, shown_decimal
 from workbench.imports.control_loop import LoopColumn, LoopColumns, loops_of
 from workbench.imports.file_kind import raw_tables
@@ -72,8 +72,10 @@ def preview(path: Path, sheet: str | None = None) -> ExportPreview:
         wider = proposal(of_all, header.table.separator)
         if _reads(wider[0]):
             columns, (words, open_), besides = of_all, wider, []
-    decimal, _ = shown_decimal(columns, header.table.separator)
-    loops = tuple(loops_of([_of_loop(each, decimal) for each in columns if each.numbers and not is_clock(each)]))
+    decimal, is_open = shown_decimal(columns, header.table.separator)
+    signals = [each for each in columns if each.numbers and not is_clock(each)]
+    told = (loops_of([_of_loop(each, sign) for each in signals]) for sign in (",." if is_open else decimal))
+    loops = tuple(next(filter(None, told), ()))
     if loops and not any(each.position for each in loops):
         words, open_ = (), tuple(_no_stem(path, each) for each in loops)
     return ExportPreview(_what(header, tables), _place(header), tuple(columns), words, (*open_, *besides), loops)
@@ -99,7 +101,8 @@ def _place(header: Header) -> str:
 
 def _of_loop(column: ColumnPreview, decimal: str) -> LoopColumn:
     """Return a column as a loop's are recognised."""
-    unit = column.unit or next(iter(column.units_behind), "") or column.unknown
+    behind = (with_any_unit(cell)[1] for cell in column.cells if isinstance(cell, str))
+    unit = column.unit or next(filter(None, behind), "") or column.unknown
     return LoopColumn(column.name, unit, numbers_of(column.cells, decimal))
 
 

@@ -61,6 +61,12 @@ SHARES: Mapping[str, tuple[float, float]] = {
     "2-10V": (0.125, -0.25),
 }
 """Share = factor raw + offset."""
+PROCESS_UNITS = re.compile(
+    r"(n?m[3³]|l|kg|t|lb|gal|bbl)/(h|hr|min|s|d)\b|\bgpm\b|\bs?cfm\b|\b[lk]pm\b|°[cf]\b|\bdeg ?[cfk]\b|"
+    r"\bph\b|\bm[3³]\b",
+    re.IGNORECASE,
+)
+"""Of a flow, a temperature and the like, of which no column of ours is."""
 SI = {ending: next(unit for unit, factor in units.items() if factor == 1.0) for ending, units in UNITS.items()}
 _ALIASES = {
     "sec secs second seconds sek sekunde sekunden": "s",

@@ -171,6 +171,10 @@ def _loose(name: str) -> str:
     return " ".join(name.split()).casefold()
 
 
+TYPES = "#TYPES"
+"""In Ignition's exports the line above the kinds of the columns: D is a number there, and no day."""
+
+
 def with_units(header: Header) -> Header:
     """Return the header with the units in it and in the rows under it, and where the samples begin."""
     units: dict[str, tuple[str, int]] = {}
@@ -184,8 +188,12 @@ def with_units(header: Header) -> Header:
     under = list(takewhile(lambda row: not _any_number(row[1], decisive), below[: BELOW if header.line else 0]))
     while under and _any_number(under[-1][1], {index for places in header.at.values() for index in places}):
         under.pop()  # a sample without a readable time, and not the end of what is said under the header
+    typed = False
     for line, cells in under:
         last = line
+        was_typed, typed = typed, cells[0] == TYPES
+        if was_typed:
+            continue
         for name, (first, *_) in header.at.items():
             text = str(cells[first]) if first < len(cells) else ""
             if unit := unit_named(text):

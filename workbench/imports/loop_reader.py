@@ -13,13 +13,16 @@ import numpy as np
 import numpy.typing as npt
 
 from config.errors import InputError
-from workbench.imports.cell_kinds import numbers_of
+from workbench.imports.cell_kinds import may_be_clock, numbers_of, with_any_unit
 from workbench.imports.clock_groups import find_groups
 from workbench.imports.column_clock import clock_of
 from workbench.imports.control_loop import LEAST_SHARE, MOST_SHARE, LoopColumns
 from workbench.imports.export_preview import ExportPreview, preview
+from workbench.imports.export_units import UNITS
 from workbench.imports.file_kind import raw_tables
 from workbench.imports.number_notation import decimal_sign
+from workbench.imports.proposal import is_clock
+from workbench.imports.raw_table import Cell
 from workbench.imports.sample_rows import Samples, collected
 from workbench.imports.time_order import in_order
 
@@ -75,6 +78,7 @@ def read_loop(
     """
     roles = dict(named or {})
     loop = None if {"time", "op", "pv"} <= set(roles) else _recognised(path, roles)
+    roles["time"], unit = _and_unit(roles["time"])
     wanted = [theirs for role, theirs in roles.items() if role != "time"]
     headers = find_groups(path, raw_tables(path), roles["time"], wanted)
     parts = [collected(path, header, roles["time"], lambda _what, _done: None) for header in headers]
@@ -86,7 +90,7 @@ def read_loop(
         if isinstance(cell, str)
     ]
     decimal = decimal or decimal_sign(str(path), texts, headers[0].table.separator)
-    read = [_of_one_clock(path, part, roles, time_format, decimal) for part in parts]
+    read = [_of_one_clock(path, part, roles, unit, time_format, decimal) for part in parts]
     time_s, columns = _laid_on_pv(path, read)
     notes = {
         key: said for part, each in zip(parts, read, strict=True) for key, said in (part.notes | each.notes).items()
@@ -123,20 +127,38 @@ class _OneClock:
 
 
 def _of_one_clock(
-    path: Path, part: Samples, roles: Mapping[str, str], time_format: str | None, decimal: str
+    path: Path, part: Samples, roles: Mapping[str, str], unit: str | None, time_format: str | None, decimal: str
 ) -> _OneClock:
-    clock = clock_of(path, part, roles["time"], None, time_format, decimal)
+    clock = clock_of(path, part, roles["time"], unit, time_format, decimal, "--time ")
     values: dict[str, Array] = {}
     for role, theirs in roles.items():
         if role == "mode" and theirs in part.cells:
             values[role] = np.array([float(MANUAL.match(str(each).strip()) is not None) for each in part.cells[theirs]])
         elif role != "time" and theirs in part.cells:
+            _require_one_unit(path, theirs, part.cells[theirs])
             values[role] = numbers_of(part.cells[theirs], decimal)
     local_from_s = clock.origin_s if clock.local else None
     time_s, rows, notes = in_order(
         path, clock.time_s, list(values.values()), part.lines, local_from_s=local_from_s, daily=clock.daily
     )
     return _OneClock(time_s + (clock.origin_s or 0.0), {role: column[rows] for role, column in values.items()}, notes)
+
+
+def _and_unit(theirs: str) -> tuple[str, str | None]:
+    """Return a clock's column and the unit that a person said behind it: `Time:ms`."""
+    name, _, unit = theirs.rpartition(":")
+    return (name, unit) if name and unit in UNITS["_s"] else (theirs, None)
+
+
+def _require_one_unit(path: Path, theirs: str, cells: Sequence[Cell]) -> None:
+    """See that one unit stands behind a column's numbers, or none.
+
+    Raises:
+        InputError: it changes, as a display's does that scales by itself.
+    """
+    units = list(dict.fromkeys(unit for cell in cells if isinstance(cell, str) and (unit := with_any_unit(cell)[1])))
+    if len(units) > 1:
+        raise InputError(str(path), f"{theirs!r} is in {' and in '.join(units)}: export it with one unit, unformatted")
 
 
 def _laid_on_pv(path: Path, parts: Sequence[_OneClock]) -> tuple[Array, dict[str, Array]]:
@@ -189,9 +211,8 @@ def _recognised(path: Path, roles: dict[str, str]) -> LoopColumns | None:
 
 
 def _mode_and_time(found: ExportPreview) -> dict[str, str]:
-    known = {}
-    for role, words in (("time", TIME), ("mode", MODE)):
-        named = [each.name for each in found.columns if words.search(each.name)]
-        if named:
-            known[role] = named[0]
-    return known
+    """Return the clock, told by its cells, or else by its name, and the mode."""
+    clocks = [each.name for each in found.columns if is_clock(each)]
+    clocks += [each.name for each in found.columns if TIME.search(each.name) or may_be_clock(each.cells)]
+    modes = [each.name for each in found.columns if MODE.search(each.name)]
+    return {role: names[0] for role, names in (("time", clocks), ("mode", modes)) if names}

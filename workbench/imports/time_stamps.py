@@ -34,6 +34,7 @@ _SHORT_DATES = (
     "%d-%b-%y",
     "%d %b %Y",
     "%b %d %Y",
+    "%b %d, %Y",
 )
 _TIMES = ("%H:%M:%S", "%H:%M:%S.%f", "%I:%M:%S %p", "%I:%M:%S.%f %p", "%H:%M", "%I:%M %p", "%H:%M:%S:%f", "%H.%M.%S")
 PROPOSED = (

@@ -74,9 +74,13 @@ def signals_in(header: Header) -> list[str]:
         return []
     for index, name in enumerate(header.names):
         cells = [cell for cell in cells_at(rows, index) if cell != ""]
+        if any(map(begins_number, cells)) or STATUS.search(name):
+            continue
         held = list(dict.fromkeys(map(str, cells)))
-        words = not any(map(begins_number, cells)) and not STATUS.search(name)
-        if words and 1 < len(held) <= min(MOST_SIGNALS, len(cells) // 4):
+        if len(held) == 1 < len(cells):  # a signal after the other, each in a block
+            rest = islice(header.table.rows(), header.samples_after, None)
+            held = list(dict.fromkeys(str(row[index]) for _, row in rest if index < len(row) and row[index] != ""))
+        if 1 < len(held) <= min(MOST_SIGNALS, len(cells) // 4):
             return [each for each in held if not each.startswith("$")]
     return []
 

@@ -9,13 +9,18 @@ The evidence for friction is the logarithm of its mean likelihood over all stems
 processes, less that of the best other cause: what is tried more often fits better by chance, and a mean pays for it.
 Friction that is small against the output's swing is none of these: where the record shows a valve that follows closely,
 the evidence is therefore negative, and where it shows nothing, 0.
+
+The output is asked the same: the loop is closed, so stem, process and controller make of the output what the output is
+later, with the sign of negative feedback. A controller integrates, and so shows a rest of the stem above its noise.
 """
 
-from dataclasses import dataclass
+from collections.abc import Sequence
+from dataclasses import dataclass, replace
 
 import numpy as np
 import numpy.typing as npt
 
+from workbench.loops.calibration import Evidence, Witness
 from workbench.loops.loop_record import Array, LoopRecord, averaged
 from workbench.loops.oscillation import Oscillation
 from workbench.loops.stem_and_process import cost_of, costs_of_stems, respond, rest_positions
@@ -28,6 +33,10 @@ JUMPS = (0.0, 0.5, 1.0)
 LAGS = (0.0, 0.05, 0.12, 0.3, 0.8, 4.0)
 DELAYS = (0.0, 0.05, 0.1, 0.17, 0.25)
 """In cycles of the loop; a quarter of a cycle of delay and a quarter of lag is all that a PI loop leaves a process."""
+WAYS_ROUND = (*DELAYS[1:], 0.35, 0.5)
+"""Delays once round the loop, likewise: none would tell the output by itself, and half a cycle turns its sign."""
+NEGATIVE_FEEDBACK = -1
+"""Sign with which the loop answers its own output."""
 LONGER, LATER = (0.7, 1.0, 1.4), (-0.025, 0.0, 0.025)
 """Factors of the lag, and cycles of delay, about the best."""
 NEARER = ((0.12, 0.25), (0.05, 0.12), (0.02, 0.05))
@@ -72,15 +81,13 @@ class Causes:
 
     Attributes:
         costs: of the best of each cause, nats, less is better.
-        evidence: for friction against the best of the others, nats.
-        explained: what friction explains beyond the disturbance alone, likewise.
+        evidence: for friction against the best of the others.
         friction: the best of it.
         lag_s, delay_s, gain: of the process; the gain in PV a % of the output.
     """
 
     costs: dict[str, float]
-    evidence: float
-    explained: float
+    evidence: Evidence
     friction: Friction
     lag_s: float
     delay_s: float
@@ -158,34 +165,65 @@ class _Trials:
 def hold_causes(record: LoopRecord, oscillation: Oscillation, action: int) -> Causes:
     """Return the causes of what a loop does; `action` is the sign that the process's gain must have, 0 if unknown."""
     rows = rows_of(record, oscillation)
-    none = np.zeros(1)
-    plain = _try(rows, none, none, none > 0.0, action)
-    sizes, ratios, manners = (
-        each.ravel()
-        for each in np.meshgrid(np.ptp(rows.output) * np.array(SHARES), JUMPS, [False, True], indexing="ij")
-    )
-    trials = _try(rows, sizes, sizes * ratios, manners, action)
-    alone = cost_of(np.zeros((0, rows.pv.size)), rows.pv)[0]
-    processes = [plain.best()[1], trials.best()[1]]
-    phases = min(_of_phases(rows, each, action) for each in processes)
-    curved = min(_of_curve(rows, each, action) for each in processes)
-    friction = _refined(rows, trials, action)
+    held = _hold(rows, action, DELAYS)
+    friction = _refined(rows, held.trials, action)
+    linear = held.plain.best()[1]
     costs = {
         "friction": friction.process.cost,
-        "linear": min(alone, phases, float(plain.costs.min())),
-        "nonlinear": min(alone, curved),
-        "disturbance": alone,
+        "linear": min(held.alone, held.phases, linear.cost),
+        "nonlinear": min(held.alone, held.curve),
+        "disturbance": held.alone,
     }
-    others = max(plain.mean_likelihood, -alone, -phases - MORE_WEIGHTS, -curved - MORE_WEIGHTS)
-    best = friction.process if costs["friction"] < costs["linear"] else processes[0]
+    best = friction.process if costs["friction"] < costs["linear"] else linear
     return Causes(
         costs,
-        trials.mean_likelihood - others,
-        max(0.0, trials.mean_likelihood + alone),
+        Evidence(held.witness, of_output(rows)),
         friction,
         best.lag * rows.period_s,
         best.delay * rows.period_s,
         best.gain * rows.pv_unit / rows.output_pct,
+    )
+
+
+def of_output(rows: Rows) -> Witness:
+    """Return what the output alone says of friction."""
+    return _hold(replace(rows, pv=averaged(rows.output, rows.coarse)), NEGATIVE_FEEDBACK, WAYS_ROUND).witness
+
+
+@dataclass(frozen=True, slots=True)
+class _Held:
+    """Trials of the output itself and of stems, and the costs of a disturbance, of any phase, of a curve."""
+
+    plain: _Trials
+    trials: _Trials
+    alone: float
+    phases: float
+    curve: float
+
+    @property
+    def witness(self) -> Witness:
+        """What it says of friction."""
+        others = max(self.plain.mean_likelihood, -self.alone, -self.phases - MORE_WEIGHTS, -self.curve - MORE_WEIGHTS)
+        friction = self.trials.mean_likelihood
+        return Witness(friction - others, max(0.0, friction + self.alone))
+
+
+def _hold(rows: Rows, action: int, delays: Sequence[float]) -> _Held:
+    none = np.zeros(1)
+    processes = rows.cycle * np.array(LAGS), rows.cycle * np.array(delays)
+    plain = _try(rows, none, none, none > 0.0, action, *processes)
+    sizes, ratios, manners = (
+        each.ravel()
+        for each in np.meshgrid(np.ptp(rows.output) * np.array(SHARES), JUMPS, [False, True], indexing="ij")
+    )
+    trials = _try(rows, sizes, sizes * ratios, manners, action, *processes)
+    best = [plain.best()[1], trials.best()[1]]
+    return _Held(
+        plain,
+        trials,
+        cost_of(np.zeros((0, rows.pv.size)), rows.pv)[0],
+        min(_of_phases(rows, each, action) for each in best),
+        min(_of_curve(rows, each, action) for each in best),
     )
 
 
@@ -255,7 +293,9 @@ def _refined(rows: Rows, trials: _Trials, action: int) -> Friction:
                     indexing="ij",
                 )
             )
-            near = _try(rows, sizes, sizes * ratios, np.full(sizes.size, manner), action, process)
+            lags = process.lag * np.array(LONGER) if process.lag else np.array([0.0, 0.02 * rows.cycle])
+            delays = process.delay + rows.cycle * np.array(LATER)
+            near = _try(rows, sizes, sizes * ratios, np.full(sizes.size, manner), action, lags, delays)
             tried.append(near)
             at, found = near.best()
             if found.cost < process.cost:
@@ -277,14 +317,10 @@ def _try(
     jumps: Array,
     manners: npt.NDArray[np.bool_],
     action: int,
-    about: Process | None = None,
+    lags: Array,
+    delays: Array,
 ) -> _Trials:
-    """Return stems with lag and delay of all that may be, or about those of a process."""
-    if about is None:
-        lags, delays = rows.cycle * np.array(LAGS), np.round(rows.cycle * np.array(DELAYS))
-    else:
-        lags = about.lag * np.array(LONGER) if about.lag else np.array([0.0, 0.02 * rows.cycle])
-        delays = np.round(about.delay + rows.cycle * np.array(LATER))
-    whole = np.unique(np.maximum(delays, 0.0)).astype(np.int64)
+    """Return stems with each lag and delay, in rows of the stem."""
+    whole = np.unique(np.maximum(np.round(delays), 0.0)).astype(np.int64)
     costs, gains = costs_of_stems(rows.output, rows.pv, rows.coarse, sizes, jumps, manners, lags, whole, action)
     return _Trials(sizes, jumps, manners, lags, whole, costs, gains)

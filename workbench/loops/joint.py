@@ -53,7 +53,7 @@ def together(found: Sequence[LoopDiagnosis]) -> Joint:
     if not told:
         return Joint(name, 0, None, None)
     evidence = mean_evidence([each for _, each in told])
-    sized = [(stiction_pct, each.nats) for stiction_pct, each in told if each.nats > 0.0]
+    sized = [(stiction_pct, each.pv.nats) for stiction_pct, each in told if each.pv.nats > 0.0]
     size = None
     if sized:
         sizes, weights = np.array(sorted(sized)).T

@@ -9,14 +9,14 @@ import numpy as np
 from config.extras import needed
 from config.results.block import Block, Table
 from config.results.result import Result
-from workbench.loops.calibration import CALIBRATION, Evidence
-from workbench.loops.causes import Causes, fitted_path, hold_causes
+from workbench.loops.calibration import CALIBRATION, Evidence, Witness
+from workbench.loops.causes import Causes, fitted_path, hold_causes, of_output, rows_of
 from workbench.loops.controller_law import ControllerLaw, see_law
 from workbench.loops.loop_record import LoopRecord
 from workbench.loops.oscillation import Oscillation, find_oscillation
 from workbench.loops.quality_gates import Gate, closed_gates
 from workbench.loops.remedies import Remedy, find_remedies
-from workbench.loops.shape_methods import Vote, out_of_phase, votes
+from workbench.loops.shape_methods import Vote, votes
 from workbench.loops.thresholds import LIMITS
 
 if TYPE_CHECKING:
@@ -33,7 +33,7 @@ class LoopDiagnosis(Result):
         record: of the loop.
         verdict: one of three.
         cause: what it is, where the valve does not stick; "" where nothing is named.
-        evidence: for friction; of an insufficient record there is none but OP's and PV's phase.
+        evidence: for friction; of an insufficient record by its output alone.
         probability: that the valve sticks; None where the record is insufficient.
         oscillation, setpoint: of OP, which has PV's period and less noise, and of SP; None where SP stands.
         law: the controller's.
@@ -139,8 +139,7 @@ class LoopDiagnosis(Result):
             "stiction_pct": friction.stiction_pct if friction else None,
             "stiction_pct_95": [friction.low_pct, friction.high_pct] if friction else None,
             "slip_jump_pct": friction.slip_jump_pct if friction else None,
-            "evidence_nats": self.evidence.nats,
-            "out_of_phase": self.evidence.out_of_phase,
+            "evidence_nats": {"pv": self.evidence.pv.nats, "op": self.evidence.output.nats},
             "costs_nats": self.causes.costs if self.causes else {},
             "period_s": self.oscillation.period_s,
             "regularity": self.oscillation.regularity,
@@ -187,13 +186,11 @@ def diagnose_loop(record: LoopRecord) -> LoopDiagnosis:
         setpoint = find_oscillation(record.sp, record.period_s)
     gates = closed_gates(record, oscillation)
     said = votes(record, oscillation) if np.ptp(record.op_pct) > 0.0 else ()
-    phase = out_of_phase(record)
     if gates:
-        none = Evidence(0.0, 0.0, phase)
-        return LoopDiagnosis(record, "cannot be told", "", none, None, oscillation, setpoint, law, gates, None, said)
+        alone = Evidence(Witness(), output_alone(record, oscillation))
+        return LoopDiagnosis(record, "cannot be told", "", alone, None, oscillation, setpoint, law, gates, None, said)
     causes = hold_causes(record, oscillation, law.action)
-    evidence = Evidence(causes.evidence, causes.explained, phase)
-    probability = CALIBRATION.probability(evidence)
+    probability = CALIBRATION.probability(causes.evidence)
     verdict: Verdict = "cannot be told"
     cause = ""
     if probability >= LIMITS.sticks_probability:
@@ -203,8 +200,15 @@ def diagnose_loop(record: LoopRecord) -> LoopDiagnosis:
     treatable = verdict == "sticks" and law.seen and np.isfinite(law.reset_s)
     remedies = _remedies(record, oscillation, law, causes) if treatable else ()
     return LoopDiagnosis(
-        record, verdict, cause, evidence, probability, oscillation, setpoint, law, gates, causes, said, remedies
+        record, verdict, cause, causes.evidence, probability, oscillation, setpoint, law, gates, causes, said, remedies
     )
+
+
+def output_alone(record: LoopRecord, oscillation: Oscillation) -> Witness:
+    """Return what a record's output says of friction; nothing where it stands, is short, or has few samples a cycle."""
+    short = record.op_pct.size < LIMITS.fewest_samples
+    slow = oscillation.period_s < LIMITS.fewest_a_cycle * record.period_s
+    return Witness() if short or slow or np.ptp(record.op_pct) == 0.0 else of_output(rows_of(record, oscillation))
 
 
 def _remedies(record: LoopRecord, oscillation: Oscillation, law: ControllerLaw, causes: Causes) -> tuple[Remedy, ...]:

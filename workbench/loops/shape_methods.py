@@ -85,17 +85,6 @@ def horch(op: Array, pv: Array, cycle: float) -> Vote:
     return Vote("Horch", index, "sticks" if index > HORCH_ODD else "no" if index < HORCH_EVEN else "open")
 
 
-def out_of_phase(record: LoopRecord) -> float:
-    """Return one less OP's and PV's correlation at lag zero, 0 to 1: Horch's index without its other lags.
-
-    0: OP is proportional to PV, or PV follows OP at once, and no rest of the stem parts them.
-    """
-    window = np.hanning(record.pv.size)
-    first, second = (window * without_trend(each) for each in (record.op_pct, record.pv))
-    first, second = first - first.mean(), second - second.mean()
-    return 1.0 - abs(float(first @ second)) / max(float(np.sqrt((first @ first) * (second @ second))), 1e-300)
-
-
 def kano(op: Array, pv: Array, cycle: float) -> Vote:
     """Return Kano's share of samples in which OP moves and PV rests, 0 to 1."""
     window = max(2, int(cycle / 12.0))

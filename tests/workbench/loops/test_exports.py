@@ -1,62 +1,147 @@
-"""Loops of others in the forms of other programs, from file to verdict by what the messages say."""
+"""Loops in the forms of other programs, from file to verdict by what the messages say."""
 
 import json
 import re
-from collections.abc import Callable
-from datetime import datetime, timedelta
+from collections.abc import Callable, Iterator
+from datetime import UTC, datetime, timedelta
 from pathlib import Path
 
-import numpy as np
 import pytest
 
+from config.errors import InputError
 from positioner.cli.main import main
+from workbench.bench.drawn_loops import draw_loop
+from workbench.imports.loop_reader import read_loop
 
-SHARED = Path(__file__).parents[4] / "shared"
-LOOP = SHARED / "data/loops/refinery_012_02.csv"
-FLOW = SHARED / "cases/exports/13-loop-sp-pv-mv/loop.csv"
-needs_data = pytest.mark.skipif(not LOOP.exists(), reason="the refinery's loops are not here")
-BEGIN = datetime(2026, 3, 2, 6)
-TAGS = {"OP": "op_pct", "PV": "pv", "SP": "sp"}
-
-
-def pairs(path: Path) -> None:
-    """Write a clock a tag, side by side, each some tenths of a second later."""
-    columns = np.genfromtxt(LOOP, delimiter=",", names=True)
-    lines = [",".join(f"FIC012.{tag}," for tag in TAGS), ",".join(["Timestamp,Value"] * 3)]
-    for row in columns:
-        at = [BEGIN + timedelta(seconds=row["time_s"] + 0.137 * late) for late in range(3)]
-        stamps = [f"{each:%d-%b-%y %H:%M:%S}.{each.microsecond // 1000:03d}" for each in at]
-        lines.append(",".join(f"{s},{row[name]:.4f}" for s, name in zip(stamps, TAGS.values(), strict=True)))
-    path.write_text("\n".join(lines) + "\n")
+LOOP = draw_loop(10, "sticks")
+BEGIN = datetime(2026, 3, 2, 6, tzinfo=UTC)
+ROWS = [
+    (BEGIN + timedelta(seconds=float(time_s)), {"OP": op, "PV": pv, "SP": sp})
+    for time_s, op, pv, sp in zip(LOOP.time_s, LOOP.op_pct, LOOP.pv, LOOP.sp, strict=True)
+]
+NAMES = ("OP", "PV", "SP")
 
 
-def row_a_value(path: Path) -> None:
-    """Write a row a value, decimal commas, tags in the first column."""
-    columns = np.genfromtxt(LOOP, delimiter=",", names=True)
-    lines = ['"VarName";"TimeString";"VarValue";"Validity"']
-    for row in columns:
-        stamp = f"{BEGIN + timedelta(seconds=row['time_s']):%d.%m.%Y %H:%M:%S}"
-        lines += [f'"FIC012_{t}";"{stamp}";{row[name]:.4f};1' for t, name in TAGS.items()]
-    path.write_text("\n".join(re.sub(r";(\d+)\.(\d+);", r";\1,\2;", line) for line in lines) + "\n")
+def pi_datalink() -> Iterator[str]:
+    """Yield PI DataLink's: a function array a tag, each with its own clock, and words where a value is bad."""
+    yield ",".join(f"FIC101.{name}," for name in NAMES)
+    yield ",".join(["Timestamp,Value"] * 3)
+    for row, (at, values) in enumerate(ROWS):
+        late = [at + timedelta(seconds=0.137 * place) for place in range(3)]
+        cells = [f"{values[name]:.4f}" for name in NAMES]
+        cells[1] = "Bad Input" if row % 97 == 5 else cells[1]
+        yield ",".join(
+            f"{t:%d-%b-%y %H:%M:%S}.{t.microsecond // 1000:03d},{c}" for t, c in zip(late, cells, strict=True)
+        )
 
 
-@needs_data
-@pytest.mark.parametrize("write", [pairs, row_a_value])
-def test_a_refinerys_loop_goes_from_another_programs_export_to_its_verdict(
-    write: Callable[[Path], None], tmp_path: Path, capsys: pytest.CaptureFixture[str]
+def aspen() -> Iterator[str]:
+    """Yield Aspen Process Explorer's: names, descriptions and units above a column each."""
+    yield "Name,FIC101.PV,FIC101.SP,FIC101.OP"
+    yield "Description,Feed to column,Feed to column,Feed valve"
+    yield "Units,m3/h,m3/h,%"
+    yield from (f"{t:%d-%b-%y %H:%M:%S}.0,{v['PV']:.4f},{v['SP']:.4f},{v['OP']:.4f}" for t, v in ROWS)
+
+
+def ignition() -> Iterator[str]:
+    """Yield Ignition's data set: lines of names, kinds and the number of rows."""
+    yield from ('"#NAMES"', '"t_stamp","FIC101/PV","FIC101/SP","FIC101/OP"', '"#TYPES"', '"date","D","D","D"')
+    yield f'"#ROWS","{len(ROWS)}"'
+    yield from (f'"{t:%Y-%m-%d %H:%M:%S}.000","{v["PV"]:.6f}","{v["SP"]:.6f}","{v["OP"]:.6f}"' for t, v in ROWS)
+
+
+def ignition_script() -> Iterator[str]:
+    """Yield what Ignition's scripts write: Java's dates."""
+    yield "t_stamp,FIC101_PV,FIC101_OP"
+    for t, v in ROWS:
+        yield f'"{t:%b} {t.day}, {t.year} {t:%I}:{t:%M:%S} {t:%p}",{v["PV"]:.6f},{v["OP"]:.6f}'
+
+
+def grafana() -> Iterator[str]:
+    """Yield Grafana's, formatted: each cell with its unit."""
+    yield '"Time","FIC101.PV","FIC101.SP","FIC101.OP"'
+    yield from (f'"{t:%Y-%m-%d %H:%M:%S}","{v["PV"]:.2f} m³/h","{v["SP"]:.2f} m³/h","{v["OP"]:.2f}%"' for t, v in ROWS)
+
+
+def grafana_unformatted() -> Iterator[str]:
+    """Yield Grafana's, unformatted: milliseconds."""
+    yield '"Time","FIC101.PV","FIC101.OP"'
+    yield from (f"{1000 * int(t.timestamp())},{v['PV']:.4f},{v['OP']:.4f}" for t, v in ROWS)
+
+
+def opc_hda() -> Iterator[str]:
+    """Yield an OPC HDA client's: a row a value, one item after the other, with its quality."""
+    yield "ItemID,Timestamp,Value,Quality"
+    for name in NAMES:
+        yield from (f"Plant.FIC101.{name},{t:%Y-%m-%dT%H:%M:%S}.000Z,{v[name]:.4f},192" for t, v in ROWS)
+
+
+def wincc() -> Iterator[str]:
+    """Yield WinCC's: a row a value, decimal commas."""
+    yield '"VarName";"TimeString";"VarValue";"Validity"'
+    for t, v in ROWS:
+        for name in NAMES:
+            yield f'"FIC101_{name}";"{t:%d.%m.%Y %H:%M:%S}";' + f"{v[name]:.4f}".replace(".", ",") + ";1"
+
+
+@pytest.mark.parametrize(
+    "form", [pi_datalink, aspen, ignition, ignition_script, grafana, grafana_unformatted, opc_hda, wincc]
+)
+def test_another_programs_export_is_read_by_what_the_messages_say(
+    form: Callable[[], Iterator[str]], tmp_path: Path
 ) -> None:
+    path = tmp_path / "export.csv"
+    path.write_text("\n".join(form()) + "\n", encoding="utf-8")
+    try:
+        read = read_loop(path)
+    except InputError as error:  # one line says the words to type
+        said = str(error)
+        named = {"time": words[0]} if (words := re.findall(r"--time (\S+:ms)", said)) else {}
+        formats = re.findall(r'--time-format "([^"]+)"', said)
+        assert len(formats) + len(named) == 1
+        read = read_loop(path, named, time_format=next(iter(formats), None))
+    assert "FIC101" in read.name
+    assert read.time_s.size == len(ROWS)
+    assert read.op_pct[10] == pytest.approx(LOOP.op_pct[10], abs=0.06)
+    assert read.pv[10] == pytest.approx(LOOP.pv[10], abs=0.01)
+
+
+def test_from_a_formatted_export_to_the_verdict(tmp_path: Path) -> None:
     export, found = tmp_path / "export.csv", tmp_path / "found.json"
-    write(export)
-    words = ["loop", str(export), "--json", str(found)]
-    if main(words) == 2:  # what is open is said, with the words to type
-        (formatted,) = re.findall(r'--time-format "([^"]+)"', capsys.readouterr().err)
-        assert main([*words, "--time-format", formatted]) == 1
+    export.write_text("\n".join(grafana()) + "\n", encoding="utf-8")
+    assert main(["loop", str(export), "--json", str(found)]) == 1
     (told,) = json.loads(found.read_text())
-    assert (told["loop"], told["verdict"]) == ("FIC012", "sticks")
-    assert told["stiction_pct"] == pytest.approx(0.6, rel=0.2)
+    assert (told["loop"], told["verdict"]) == ("FIC101", "sticks")
+    assert told["stiction_pct"] == pytest.approx(LOOP.truth.stiction_pct, rel=0.2)
 
 
-@pytest.mark.skipif(not FLOW.exists(), reason="the export of a flow loop is not here")
-def test_a_flow_loop_of_another_program_is_told_at_once(capsys: pytest.CaptureFixture[str]) -> None:
-    assert main(["loop", str(FLOW)]) == 1
-    assert "cannot be told" in capsys.readouterr().out
+def scaled(row: int) -> str:
+    """Return a line of a display that scales by itself."""
+    flow = f"{900 + row} L/h" if row < 100 else f"{0.9 + row / 1000:.3f} m³/h"
+    return f"{row},{flow},{50 + row % 9} %"
+
+
+def counted(*periods: int) -> Callable[[int], str]:
+    """Return lines of time and of numbers that come back after some rows."""
+    return lambda row: ",".join(map(str, (row, *(50 + row % each for each in periods))))
+
+
+@pytest.mark.parametrize(
+    ("header", "row", "said"),
+    [
+        ("Time,FIC101.PV,FIC101.OP", scaled, "is in L/h and in m³/h"),
+        ("Zeit;FIC101.PV;FIC101.MV", lambda row: f"{row};{100 + row};4{row % 9},125", "--decimal"),
+        ("Time,FIC101.PV,FIC101.OP,FV101.ZT", counted(7, 9, 8), "positioner diagnose"),
+        ("Time,FIC1.PV,FIC1.OP,LIC2.PV,LIC2.OP", counted(7, 9, 5, 8), "holds 2 loops, FIC1, LIC2"),
+        ("Time,FIC101.PV", counted(7), "no loop is recognised"),
+    ],
+)
+def test_what_a_person_must_say_is_one_line(
+    header: str, row: Callable[[int], str], said: str, tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    export = tmp_path / "export.csv"
+    export.write_text("\n".join([header, *map(row, range(200))]) + "\n", encoding="utf-8")
+    assert main(["loop", str(export)]) == 2
+    error = capsys.readouterr().err
+    assert said in error
+    assert error.count("\n") == 1

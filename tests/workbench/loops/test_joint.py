@@ -4,7 +4,7 @@ import pytest
 
 from workbench.bench.drawn_loops import draw_loop
 from workbench.loops import LoopDiagnosis, LoopRecord, diagnose_loop
-from workbench.loops.calibration import Evidence
+from workbench.loops.calibration import Evidence, Witness
 from workbench.loops.joint import together
 
 
@@ -16,7 +16,7 @@ def sticking() -> LoopDiagnosis:
 
 def of_evidence(each: LoopDiagnosis, nats: float) -> LoopDiagnosis:
     """Return the same with this evidence, of 50 nats that friction explains."""
-    return replace(each, evidence=Evidence(nats, 50.0, 0.5))
+    return replace(each, evidence=Evidence(Witness(nats, 50.0), Witness()))
 
 
 def test_a_record_that_tells_is_heard_among_others_that_do_not(sticking: LoopDiagnosis) -> None:

@@ -34,6 +34,18 @@ def test_another_cause_is_not_called_sticking(cause: str) -> None:
     assert diagnosed(7, cause)[1].verdict != "sticks"
 
 
+def test_the_output_alone_tells_a_stem_that_rests_from_a_disturbance() -> None:
+    told = {cause: diagnosed(seed, cause)[1].evidence for seed, cause in ((10, "sticks"), (7, "external noise"))}
+    assert told["sticks"].output.nats > 10.0
+    assert told["external noise"].output.nats < 1.0
+
+
+def test_what_the_loops_own_output_says_does_not_hang_on_the_process_value() -> None:
+    record = record_of(draw_loop(10, "sticks"))
+    still = replace(record, pv=np.full(record.pv.size, 3.0))
+    assert diagnose_loop(still).evidence.output == diagnose_loop(record).evidence.output
+
+
 @pytest.mark.parametrize(
     ("code", "broken"),
     [

@@ -7,7 +7,7 @@ from workbench.loops.controller_law import see_law
 from workbench.loops.loop_record import LoopRecord
 from workbench.loops.oscillation import find_oscillation
 from workbench.loops.quality_gates import turns
-from workbench.loops.shape_methods import hagglund, he, horch, out_of_phase
+from workbench.loops.shape_methods import hagglund, he, horch
 
 TIME = np.arange(1000.0)
 SINE = np.sin(2.0 * np.pi * TIME / 40.0)
@@ -43,14 +43,6 @@ def test_each_method_of_the_literature_tells_its_own_shape() -> None:
     assert (hagglund(SQUARE, 40.0).says, hagglund(SINE, 40.0).says) == ("sticks", "no")
     quarter = np.sin(2.0 * np.pi * (TIME - 10.0) / 40.0)
     assert (horch(SINE, quarter, 40.0).says, horch(SINE, -SINE, 40.0).says) == ("sticks", "no")
-
-
-def test_out_of_phase_are_a_quarter_of_a_cycle_and_not_proportional_action() -> None:
-    def of(pv: np.ndarray) -> float:
-        return out_of_phase(LoopRecord("L", 0.0, 1.0, SINE, pv))
-
-    assert of(-3.0 * SINE) == pytest.approx(0.0, abs=1e-9)
-    assert of(np.sin(2.0 * np.pi * (TIME - 10.0) / 40.0)) == pytest.approx(1.0, abs=0.02)
 
 
 def test_turns_are_counted_that_come_back_by_a_quarter() -> None:
