@@ -34,9 +34,9 @@ from workbench.blind.hiding import drawn_valve
 from workbench.blind.input_signal import excitation
 from workbench.blind.trial import NOISE_M, Trial
 from workbench.compare.comparison import compare
-from workbench.fleet.examination import Request, examine, is_at_floor
+from workbench.data.kept_results import KeptResults
+from workbench.fleet.examination import Examination, Request, examine, is_at_floor, request_key
 from workbench.fleet.fleet import fleet
-from workbench.fleet.store import Store, request_key
 from workbench.fleet.tables import write_tables
 
 SAMPLES, PERIOD_S = 251, 0.02
@@ -144,7 +144,7 @@ def _slope(low: Line, high: Line) -> list[str]:
 
 def alone_s(folder: Path, recordings: int) -> tuple[float, float]:
     """Return what an examination, and naming and keeping it, take in one process without Dask, s of CPU each."""
-    store = Store(folder / "out-alone")
+    store = KeptResults(folder / "out-alone", Examination)
     rows = [row.split(",") for row in (folder / f"plant-{recordings}.csv").read_text().splitlines()[1:]]
     spent_s = np.zeros(2)
     for i, (_, valve, recording, _) in enumerate(rows):

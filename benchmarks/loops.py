@@ -22,7 +22,7 @@ from workbench.bench.drawn_loops import Array, draw_loop
 from workbench.bench.methods import evidence_of, loop_records
 from workbench.bench.scores import area
 from workbench.loops import LoopRecord, diagnose_loop
-from workbench.loops.calibration import Calibration, Evidence, calibrate
+from workbench.loops.calibration import Calibration, Evidence
 from workbench.loops.thresholds import LIMITS
 
 NUMBERS, THRESHOLD = 1000, 2000
@@ -39,6 +39,19 @@ class Told:
     sticks: bool
     judged: bool
     size_ratio: float | None
+
+
+def calibrate(loops: Sequence[Evidence], sticks: Array) -> Calibration:
+    """Return the calibration of n loops; `sticks`, (n,), is 1 or 0. By Newton's method, weakly regularised."""
+    features = np.array([(1.0, each.pv.weight, each.output.weight) for each in loops])
+    found = np.zeros(3)
+    penalty = np.diag([0.0, 0.05, 0.05])
+    for _ in range(50):
+        says = 1.0 / (1.0 + np.exp(-np.clip(features @ found, -30.0, 30.0)))
+        slope = features.T @ (sticks - says) - penalty @ found
+        curvature = (features * (says * (1.0 - says))[:, None]).T @ features + penalty
+        found = found + np.linalg.solve(curvature, slope)
+    return Calibration(*found.tolist())
 
 
 def tell(case: Case) -> Told | None:

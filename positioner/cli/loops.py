@@ -13,6 +13,7 @@ EXAMPLE = "positioner loops plant.csv --report plant.html"
 def add_arguments(parser: argparse.ArgumentParser) -> None:
     """Declare the command line."""
     parser.add_argument("manifest", type=Path, metavar="MANIFEST", help="CSV: loop, file, and time, op, pv, sp, mode")
+    parser.add_argument("--out", type=Path, metavar="FOLDER", help="keep what is worked out here, as `fleet` does")
     parser.add_argument("--workers", type=int, metavar="N", help="processes (one a core)")
     parser.add_argument("--json", type=Path, metavar="FILE", help="write what was found as JSON, a list")
     parser.add_argument("--report", type=Path, metavar="FILE.html", help="write the ranking as a page")
@@ -33,7 +34,9 @@ def run(arguments: argparse.Namespace) -> int:
     if arguments.workers is not None and arguments.workers < 1:
         raise InputError("--workers", f"must be 1 or more, got {arguments.workers}")
     entries = read_manifest(arguments.manifest)
-    plant = diagnose_plant(entries, arguments.workers, lambda each: print(each.sentence, file=sys.stderr, flush=True))
+    plant = diagnose_plant(
+        entries, arguments.workers, lambda each: print(each.sentence, file=sys.stderr, flush=True), arguments.out
+    )
     if arguments.json is not None:
         write_json(arguments.json, [each.as_json() for each in plant.ranked])
     if arguments.report is not None:

@@ -73,3 +73,22 @@ def test_a_plant_is_ranked_and_what_cannot_be_read_is_said(tmp_path: Path, capsy
     assert out.index("  A ") < out.index("  B ")
     assert "C: " in err
     assert page.stat().st_size > 1e6
+
+
+def test_what_was_worked_out_of_a_plants_loop_is_kept_and_taken_as_kept(
+    tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    written(tmp_path / "a.csv", "t,a,b", LOOP.time_s, LOOP.op_pct, LOOP.pv)
+    (tmp_path / "plant.csv").write_text("loop,file,time,op,pv\nA,a.csv,t,a,b\n")
+    words = ["loops", str(tmp_path / "plant.csv"), "--workers", "1", "--out", str(tmp_path / "out")]
+    assert main(words) == 1
+    (kept,) = (tmp_path / "out/examinations").glob("*/*.json")
+    found = json.loads(kept.read_text())
+    found["friction"]["high_pct"] = 77.0
+    kept.write_text(json.dumps(found))
+    capsys.readouterr()
+    assert main(words) == 1
+    assert "to 77)" in capsys.readouterr().err
+    written(tmp_path / "a.csv", "t,a,b", LOOP.time_s, LOOP.op_pct, LOOP.pv + 1.0)
+    assert main(words) == 1
+    assert "to 77)" not in capsys.readouterr().err

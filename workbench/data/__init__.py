@@ -10,5 +10,6 @@ Its files:
     motion            velocity and acceleration
     stillness         which rows tell something, and which only say it again
     stretches         of a long one, those that tell the most
+    kept_results      results kept in a folder by the content of what they are of
     imposed_motion    a bench where a rig imposes the position, and static curves
 """

@@ -10,7 +10,6 @@ Its files:
     examination         one recording held against one model: looked at, refitted, diagnosed
     valve_course        a valve's recordings in turn, its models over time, what it complains of
     engine              examinations on many processors, by Dask
-    store               examinations kept, so that none is made twice
     model_changes       what changed of the valves since a time
     tables              results for other programs, as Parquet
     fleet_report        the ranking as a page

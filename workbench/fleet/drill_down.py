@@ -11,9 +11,8 @@ from config.errors import InputError
 from config.recording import Recording
 from config.writing import write_valve
 from workbench.diagnosis.diagnosis import diagnose
-from workbench.fleet.examination import CHANGED, UNTOLD
+from workbench.fleet.examination import CHANGED, UNTOLD, request_key
 from workbench.fleet.fleet import Fleet
-from workbench.fleet.store import request_key
 from workbench.fleet.valve_course import ValveCourse
 from workbench.report.diagnosis_report import report_diagnosis
 from workbench.report.page import Subject, require_plotly

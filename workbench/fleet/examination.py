@@ -27,7 +27,9 @@ from config.loading import Schema
 from config.recording import Recording
 from config.valve_file import ValveFile
 from config.writing import valve_toml
+from sim.effect import find_effect
 from workbench.compare.comparison import NUMERICAL, Comparison, compare
+from workbench.data.kept_results import key_of
 from workbench.diagnosis.diagnosis import Diagnosis, diagnose
 from workbench.fit.fit_result import Fit
 from workbench.fit.fitted_parameter import Fitted
@@ -70,6 +72,21 @@ class Request:
     def is_first(self) -> bool:
         """Whether what was known of the valve before is a drawing."""
         return self.known_by is None
+
+
+def request_key(recording: Path, model: ValveFile, known_by: str) -> str:
+    """Return the name of an examination: of the bytes of the recording and of all that judges it.
+
+    Args:
+        recording: the file.
+        model: what it is held against.
+        known_by: the name of the examination by which the model was accepted; empty for a drawing.
+
+    Raises:
+        OSError: the recording cannot be read.
+    """
+    own = [find_effect(each.name, str(recording)).source for each in model.effect if each.name.endswith(".py")]
+    return key_of(recording, [RULES, known_by, valve_toml(model), *own])
 
 
 class Change(Schema):

@@ -11,11 +11,11 @@ from config.errors import InputError
 from config.results.block import Block, Table
 from config.results.result import Result
 from config.valve_file import find_valve, load_valve, valve_alone
+from workbench.data.kept_results import KeptResults
 from workbench.fleet.engine import TIME_LIMIT_S, cluster, work
-from workbench.fleet.examination import AS_BEFORE, UNREADABLE, Examination, Request, unreadable
+from workbench.fleet.examination import AS_BEFORE, UNREADABLE, Examination, Request, request_key, unreadable
 from workbench.fleet.manifest import Entry, Manifest, read_manifest
 from workbench.fleet.model_changes import ModelChanges, changed_since
-from workbench.fleet.store import Store, request_key
 from workbench.fleet.valve_course import ValveCourse, valve_in
 
 if TYPE_CHECKING:
@@ -133,7 +133,7 @@ def fleet(
         CommandFailed: the scheduler is gone.
     """
     read = read_manifest(Path(manifest))
-    store = Store(Path(out))
+    store = KeptResults(Path(out), Examination)
     running = [_Running(name, entries, read, store, told) for name, entries in read.valves.items()]
     waiting = [each for each in running if not each.is_through()]
     if waiting:
@@ -147,7 +147,12 @@ class _Running:
     """A valve's course under way."""
 
     def __init__(
-        self, name: str, entries: Sequence[Entry], manifest: Manifest, store: Store, told: Told | None
+        self,
+        name: str,
+        entries: Sequence[Entry],
+        manifest: Manifest,
+        store: KeptResults[Examination],
+        told: Told | None,
     ) -> None:
         self._entries, self._folder, self._store, self._told = entries, manifest.folder, store, told
         self._asked: Request | None = None

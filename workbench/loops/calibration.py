@@ -17,8 +17,6 @@ from math import copysign, exp, log1p, sqrt
 
 import numpy as np
 
-from workbench.loops.loop_record import Array
-
 
 @dataclass(frozen=True, slots=True)
 class Witness:
@@ -66,16 +64,3 @@ class Calibration:
 
 
 CALIBRATION = Calibration(constant=-0.31, of_pv=1.59, of_output=1.09)
-
-
-def calibrate(loops: Sequence[Evidence], sticks: Array) -> Calibration:
-    """Return the calibration of n loops; `sticks`, (n,), is 1 or 0. By Newton's method, weakly regularised."""
-    features = np.array([(1.0, each.pv.weight, each.output.weight) for each in loops])
-    found = np.zeros(3)
-    penalty = np.diag([0.0, 0.05, 0.05])
-    for _ in range(50):
-        says = 1.0 / (1.0 + np.exp(-np.clip(features @ found, -30.0, 30.0)))
-        slope = features.T @ (sticks - says) - penalty @ found
-        curvature = (features * (says * (1.0 - says))[:, None]).T @ features + penalty
-        found = found + np.linalg.solve(curvature, slope)
-    return Calibration(*found.tolist())

@@ -177,8 +177,8 @@ def ratio(value: float | None) -> str:
     return "–" if value is None else f"{value:.2f}"
 
 
-def diagnose_loop(record: LoopRecord) -> LoopDiagnosis:
-    """Return what is said of a loop's record."""
+def diagnose_loop(record: LoopRecord, known: Causes | None = None) -> LoopDiagnosis:
+    """Return what is said of a loop's record; `known` are its causes where they were worked out before."""
     oscillation = find_oscillation(record.op_pct, record.period_s)
     law = see_law(record)
     setpoint = None
@@ -189,7 +189,7 @@ def diagnose_loop(record: LoopRecord) -> LoopDiagnosis:
     if gates:
         alone = Evidence(Witness(), output_alone(record, oscillation))
         return LoopDiagnosis(record, "cannot be told", "", alone, None, oscillation, setpoint, law, gates, None, said)
-    causes = hold_causes(record, oscillation, law.action)
+    causes = known or hold_causes(record, oscillation, law.action)
     probability = CALIBRATION.probability(causes.evidence)
     verdict: Verdict = "cannot be told"
     cause = ""

@@ -1,10 +1,13 @@
 """Many loops: ranked by what they cost and how sure it is, and which of them oscillate together.
 
 A manifest is a CSV file: `loop,file`, and where the file does not say it by itself the columns `time,op,pv,sp,mode`; a
-file may be named by many loops. Loops that oscillate regularly with one period are a group. The likeliest source of it
-is the valve that sticks surest; else the loop whose PV is ahead of all others by up to a quarter of a period, where
-records are of one time; else that with the most harmonics: friction makes them, and what is downstream of it filters
-them out (Thornhill and Hagglund 1997).
+file may be named by many loops. What was worked out of a file is kept in a folder, as a fleet's examinations are: of
+5000 loops the next night works out only those that are new.
+
+Loops that oscillate regularly with one period are a group. The likeliest source of it is the valve that sticks surest;
+else the loop whose PV is ahead of all others by up to a quarter of a period, where records are of one time; else that
+with the most harmonics: friction makes them, and what is downstream of it filters them out (Thornhill and Hagglund
+1997).
 """
 
 import csv
@@ -12,13 +15,16 @@ import os
 from collections.abc import Callable, Sequence
 from concurrent.futures import ProcessPoolExecutor
 from dataclasses import dataclass
+from functools import partial
 from pathlib import Path
 
 import numpy as np
 
 from config.errors import InputError
 from config.plain_file import read_plain
+from workbench.data.kept_results import KeptResults, key_of
 from workbench.imports.loop_reader import ROLES, read_loop
+from workbench.loops.causes import RULES, Causes
 from workbench.loops.loop_diagnosis import LoopDiagnosis, diagnose_loop
 from workbench.loops.loop_record import LoopRecord
 from workbench.loops.oscillation import without_trend
@@ -84,12 +90,26 @@ def read_manifest(path: Path) -> tuple[Entry, ...]:
     return tuple(entries)
 
 
-def diagnose_plant(entries: Sequence[Entry], workers: int | None, tell: Callable[[LoopDiagnosis], None]) -> Plant:
-    """Return the loops of a manifest, ranked; `tell` is given each as it is done."""
+def diagnose_plant(
+    entries: Sequence[Entry], workers: int | None, tell: Callable[[LoopDiagnosis], None], out: Path | None = None
+) -> Plant:
+    """Return the loops of a manifest, ranked.
+
+    Args:
+        entries: of the manifest.
+        workers: processes; None: one a core.
+        tell: is given each as it is done.
+        out: folder in which what was worked out is kept; None: nothing is.
+
+    Raises:
+        InputError: the folder cannot be written, or is none of this.
+    """
     done: list[LoopDiagnosis] = []
     unreadable: list[tuple[str, str]] = []
+    if out is not None:
+        KeptResults(out, Causes)
     with ProcessPoolExecutor(max_workers=workers or os.cpu_count()) as pool:
-        for entry, found in zip(entries, pool.map(_diagnosed, entries, chunksize=1), strict=True):
+        for entry, found in zip(entries, pool.map(partial(_diagnosed, out), entries, chunksize=1), strict=True):
             if isinstance(found, str):
                 unreadable.append((entry.loop, found))
             else:
@@ -98,12 +118,21 @@ def diagnose_plant(entries: Sequence[Entry], workers: int | None, tell: Callable
     return Plant(tuple(sorted(done, key=_rank)), tuple(unreadable), tuple(find_groups(done)))
 
 
-def _diagnosed(entry: Entry) -> LoopDiagnosis | str:
+def _diagnosed(out: Path | None, entry: Entry) -> LoopDiagnosis | str:
     try:
         read = read_loop(entry.file, dict(entry.named))
-        return diagnose_loop(
-            LoopRecord.of_samples(entry.loop, read.begin_s + read.time_s, read.op_pct, read.pv, read.sp, read.automatic)
+        record = LoopRecord.of_samples(
+            entry.loop, read.begin_s + read.time_s, read.op_pct, read.pv, read.sp, read.automatic
         )
+        if out is None:
+            return diagnose_loop(record)
+        kept = KeptResults(out, Causes)
+        key = key_of(entry.file, ["loop", RULES, entry.named])
+        before = kept.get(key)
+        found = diagnose_loop(record, before)
+        if before is None and found.causes is not None:
+            kept.put(key, found.causes)
+        return found
     except InputError as error:
         return str(error)
 

@@ -50,27 +50,27 @@ def votes(record: LoopRecord, oscillation: Oscillation) -> tuple[Vote, ...]:
 
 def he(op: Array, cycle: float) -> Vote:
     """Return He's index, 0 to 1, of an output, (n,), of `cycle` rows a cycle."""
-    errors = [
-        (_misfit(half, np.sin(np.pi * along)), _triangle_misfit(half, along)) for half, along in _half_cycles(op, cycle)
-    ]
-    if len(errors) < FEWEST_HALVES:
-        return Vote("He", 0.5, "open")
-    sine, triangle = np.sum(errors, axis=0)
+    sine, triangle = _misfits(op, cycle, _triangle_misfit) or (1.0, 1.0)
     index = float(sine / max(sine + triangle, 1e-300))
     return Vote("He", index, "sticks" if index > HE_STICKS else "no" if index < HE_NO else "open")
 
 
 def hagglund(error: Array, cycle: float) -> Vote:
     """Return Hägglund's index, -1 to 1, of a control error, (n,)."""
-    errors = [
-        (_misfit(half, np.sin(np.pi * along)), _misfit(half, np.ones(half.size)))
-        for half, along in _half_cycles(error, cycle)
-    ]
-    if len(errors) < FEWEST_HALVES:
+    found = _misfits(error, cycle, lambda half, _: _misfit(half, np.ones(half.size)))
+    if found is None:
         return Vote("Hagglund", 0.0, "open")
-    sine, square = np.sum(errors, axis=0)
+    sine, square = found
     index = float((sine - square) / max(sine + square, 1e-300))
     return Vote("Hagglund", index, "sticks" if index > 0.0 else "no")
+
+
+def _misfits(values: Array, cycle: float, other: Callable[[Array, Array], float]) -> tuple[float, float] | None:
+    """Return what half sines leave of the half cycles, and what another shape does; None of too few of them."""
+    halves = _half_cycles(values, cycle)
+    if len(halves) < FEWEST_HALVES:
+        return None
+    return sum(_misfit(half, np.sin(np.pi * at)) for half, at in halves), sum(other(half, at) for half, at in halves)
 
 
 def horch(op: Array, pv: Array, cycle: float) -> Vote:

@@ -1,7 +1,7 @@
-"""Examinations kept in a folder, one file each, named by the content of what was examined: none is made twice.
+"""Results kept in a folder, one file each, named by the content of what they are of: none is worked out twice.
 
 A file is written whole or not at all, so that whoever is killed loses only what was under way. The folder says which
-form its files have; another form is refused, never half-read.
+form its files have; another form is refused, never half-read. A fleet's examinations and a plant's loops share one.
 """
 
 import json
@@ -9,27 +9,28 @@ from collections.abc import Sequence
 from hashlib import sha256
 from importlib.metadata import version
 from pathlib import Path
+from typing import Generic, TypeVar
+
+from pydantic import TypeAdapter
 
 from config.errors import InputError
-from config.valve_file import ValveFile
 from config.whole_file import replace_whole
-from config.writing import valve_toml
-from sim.effect import find_effect
-from workbench.fleet.examination import RULES, Examination
 
 FORM = 1
 """Of the folder; to be raised when it is laid out differently."""
+Kept = TypeVar("Kept")
 
 
-class Store:
-    """The folder.
+class KeptResults(Generic[Kept]):
+    """The folder, for results of one type.
 
     Raises:
         InputError: it cannot be written, or has another form.
     """
 
-    def __init__(self, folder: Path) -> None:
+    def __init__(self, folder: Path, kind: type[Kept]) -> None:
         self.folder = folder
+        self._form: TypeAdapter[Kept] = TypeAdapter(kind)
         marker = folder / "fleet.json"
         try:
             (folder / "examinations").mkdir(parents=True, exist_ok=True)
@@ -39,15 +40,15 @@ class Store:
             raise InputError(str(folder), f"cannot be written: {error.strerror}") from None
         _require_form(marker)
 
-    def get(self, key: str) -> Examination | None:
+    def get(self, key: str) -> Kept | None:
         """Return what was kept; None if nothing is, or what is there cannot be read."""
         try:
-            return Examination.model_validate_json(self._path(key).read_bytes())
+            return self._form.validate_json(self._path(key).read_bytes())
         except (OSError, ValueError):
             return None
 
-    def put(self, key: str, found: Examination) -> None:
-        """Keep an examination.
+    def put(self, key: str, found: Kept) -> None:
+        """Keep a result.
 
         Raises:
             InputError: the disk is full, or the folder is gone.
@@ -55,7 +56,7 @@ class Store:
         path = self._path(key)
         try:
             path.parent.mkdir(exist_ok=True)
-            replace_whole(path, found.model_dump_json() + "\n")
+            replace_whole(path, self._form.dump_json(found).decode() + "\n")
         except OSError as error:
             raise InputError(str(path), f"cannot be written: {error.strerror}; what is kept stays") from None
 
@@ -72,25 +73,12 @@ def _require_form(marker: Path) -> None:
         raise InputError(str(marker), f"form: is {form}, allowed is {FORM}: choose another folder, or remove this one")
 
 
-def request_key(recording: Path, model: ValveFile, known_by: str) -> str:
-    """Return the name of an examination: of the bytes of the recording and of all that judges it.
-
-    Args:
-        recording: the file.
-        model: what it is held against.
-        known_by: the name of the examination by which the model was accepted; empty for a drawing.
+def key_of(file: Path, judges: Sequence[object]) -> str:
+    """Return the name of a result: of the bytes of a file, of this version, and of all else that judges it.
 
     Raises:
-        OSError: the recording cannot be read.
+        OSError: the file cannot be read.
     """
-    own = [find_effect(each.name, str(recording)) for each in model.effect if each.name.endswith(".py")]
-    judges: Sequence[object] = [
-        RULES,
-        version("positioner"),
-        known_by,
-        valve_toml(model),
-        *(each.source for each in own),
-    ]
-    digest = sha256(recording.read_bytes())
-    digest.update(json.dumps(judges).encode())
+    digest = sha256(file.read_bytes())
+    digest.update(json.dumps([version("positioner"), *judges]).encode())
     return digest.hexdigest()
