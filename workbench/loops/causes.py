@@ -26,7 +26,7 @@ from workbench.loops.oscillation import Oscillation
 from workbench.loops.stem_and_process import cost_of, costs_of_stems, respond, rest_positions
 from workbench.loops.thresholds import LIMITS
 
-RULES = 1
+CAUSES_FORM = 1
 """To be raised when causes would come out differently: what was kept is then made anew."""
 SHARES = (0.12, 0.17, 0.24, 0.33, 0.44, 0.55, 0.66, 0.77, 0.87, 0.95)
 """Apparent stiction that is tried, of the output's span: less does not rule a loop, beyond it the stem never moves."""

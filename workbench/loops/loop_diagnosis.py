@@ -82,9 +82,23 @@ class LoopDiagnosis(Result):
             return f"{self.record.name}: insufficient: {said}; record {instead}"
         return f"{self.record.name}: cannot be told ({100 * (self.probability or 0.0):.0f} % sticks): {OPEN}"
 
+    @property
+    def advice(self) -> str:
+        """What to do: first the valve, and until then what costs the least error; "" where it does not stick."""
+        if self.verdict != "sticks":
+            return ""
+        better = [(r.error_ratio, r) for r in self.remedies[1:] if r.error_ratio is not None and r.error_ratio < 1.0]
+        first = "to do: maintenance of the valve, packing and positioner"
+        if not better:
+            return first + ("" if self.remedies else "; no settings, for the controller's law is not seen")
+        _, least = min(better, key=lambda each: each[0])
+        ratios = f"error {ratio(least.error_ratio)} of now, travel {ratio(least.travel_ratio)}"
+        return f"{first}; until then {least.name}, {least.settings}: {ratios}, simulated"
+
     def blocks(self) -> list[Block]:
-        """Return the verdict, the causes, and the votes beside it."""
-        said: list[Block] = [self.sentence, *self.record.notes, self._motion(), self._law()]
+        """Return the verdict, what to do, the causes, and the votes beside it."""
+        advice = [self.advice] if self.advice else []
+        said: list[Block] = [self.sentence, *advice, *self.record.notes, self._motion(), self._law()]
         if self.causes is not None:
             least = min(self.causes.costs.values())
             said.append(
@@ -152,6 +166,7 @@ class LoopDiagnosis(Result):
             ],
             "votes": {vote.method: {"index": vote.index, "says": vote.says} for vote in self.votes},
             "sentence": self.sentence,
+            "advice": self.advice,
         }
 
     def plot(self) -> "Figure":
@@ -168,7 +183,7 @@ class LoopDiagnosis(Result):
         return figure  # type: ignore[no-any-return]
 
 
-REMEDIES = "Of now, simulated on the identified loop; – where that does not swing as the record does:"
+REMEDIES = "Of now, simulated on the identified loop (– where that does not swing as the record does):"
 OPEN = "a record with larger moves, or 20 more cycles, would tell; so would the stem's own position"
 
 

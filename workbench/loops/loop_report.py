@@ -125,7 +125,7 @@ def _stiction(each: LoopDiagnosis) -> str:
 
 
 def _verdict(each: LoopDiagnosis, name: str) -> Html:
-    said = text(*each.record.notes)
+    said = text(*filter(None, (each.advice, *each.record.notes)))
     if each.remedies:
         rows = [Row((one.name, one.settings, ratio(one.error_ratio), ratio(one.travel_ratio))) for one in each.remedies]
         head = ("What to do", "Settings", "Error, of now", "Travel, of now")
@@ -149,7 +149,7 @@ def _causes(each: LoopDiagnosis, name: str) -> Html:
         return text("No causes were compared: the record is insufficient.")
     least = min(each.causes.costs.values())
     ordered = sorted(each.causes.costs.items(), key=lambda item: item[1])
-    rows = [Row((cause, f"{cost - least:.1f}" if np.isfinite(cost) else "refused")) for cause, cost in ordered]
+    rows = [Row((cause, f"{cost - least:.1f}")) for cause, cost in ordered]
     return table(f"{name}-causes", ("Cause", "Behind the best, nats"), rows)
 
 

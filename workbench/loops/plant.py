@@ -24,7 +24,7 @@ from config.errors import InputError
 from config.plain_file import read_plain
 from workbench.data.kept_results import KeptResults, key_of
 from workbench.imports.loop_reader import ROLES, read_loop
-from workbench.loops.causes import RULES, Causes
+from workbench.loops.causes import CAUSES_FORM, Causes
 from workbench.loops.loop_diagnosis import LoopDiagnosis, diagnose_loop
 from workbench.loops.loop_record import LoopRecord
 from workbench.loops.oscillation import without_trend
@@ -127,7 +127,7 @@ def _diagnosed(out: Path | None, entry: Entry) -> LoopDiagnosis | str:
         if out is None:
             return diagnose_loop(record)
         kept = KeptResults(out, Causes)
-        key = key_of(entry.file, ["loop", RULES, entry.named])
+        key = key_of(entry.file, ["loop", CAUSES_FORM, entry.named])
         before = kept.get(key)
         found = diagnose_loop(record, before)
         if before is None and found.causes is not None:

@@ -24,7 +24,7 @@ ORDER = 4
 """Of the autoregressive disturbance: two resonances, an oscillation from outside and its harmonic or a drift."""
 TINY = 1e-14
 """Of PV's variance: the digits of a stored number."""
-ALIKE = 1e-12
+RIDGE = 1e-12
 """Of a response's power: two that are alike have one weight between them, and no division by zero."""
 LEAST_MOTION = 0.1
 """Of the output's standard deviation: a stem that moves less explains no PV."""
@@ -103,7 +103,7 @@ def _weigh(shapes: Array, target: Array, weights: Array) -> None:
         weights[first] = _product(shapes[first], target, 0, 0)
         for second in range(count):
             normal[first, second] = _product(shapes[first], shapes[second], 0, 0)
-        normal[first, first] += TINY + ALIKE * normal[first, first]
+        normal[first, first] += TINY + RIDGE * normal[first, first]
     _solve(normal, weights)
 
 

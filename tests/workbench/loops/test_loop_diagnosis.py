@@ -29,6 +29,14 @@ def test_a_sticking_valve_is_called_so_and_how_much(seed: int) -> None:
     assert friction.stiction_pct == pytest.approx(loop.truth.stiction_pct, rel=0.2)
 
 
+def test_what_to_do_is_said_with_settings_and_what_they_bring() -> None:
+    found = diagnosed(10, "sticks")[1]
+    best = min(found.remedies[1:], key=lambda each: each.error_ratio or 9.0)
+    assert f"until then {best.name}, {best.settings}: error {best.error_ratio:.2f}" in found.advice
+    assert "no settings" in replace(found, remedies=()).advice
+    assert replace(found, verdict="something else").advice == ""
+
+
 @pytest.mark.parametrize("cause", ["tight tuning", "external sine", "external noise", "nonlinear process"])
 def test_another_cause_is_not_called_sticking(cause: str) -> None:
     assert diagnosed(7, cause)[1].verdict != "sticks"
