@@ -104,7 +104,10 @@ class LoopDiagnosis(Result):
             said.append(
                 Table(
                     ("cause", "behind the best, nats"),
-                    [(name, f"{cost - least:.1f}") for name, cost in sorted(self.causes.costs.items(), key=_second)],
+                    [
+                        (name, f"{cost - least:.1f}")
+                        for name, cost in sorted(self.causes.costs.items(), key=lambda item: item[1])
+                    ],
                 )
             )
         if self.remedies:
@@ -247,7 +250,3 @@ def _other(oscillation: Oscillation, setpoint: Oscillation | None, causes: Cause
     curved = causes.costs["linear"] - causes.costs["nonlinear"] > 2.0 * LIMITS.interval_cost
     through = ", through a curved process or valve" if curved else ""
     return f"tight tuning, or an oscillation from outside{through}: in manual it stops, or goes on"
-
-
-def _second(item: tuple[str, float]) -> float:
-    return item[1]
