@@ -34,7 +34,8 @@ STEP_S = 10.0
 DEVICE_S = 0.007
 """Of no whole ratio to the periods of the loop."""
 QUANTUM = 1.0 / 2**14
-LOWEST, HIGHEST = 0.4, 0.85
+LOWEST, HIGHEST, ABOVE_LOWEST = 0.4, 0.85, 0.02
+"""Of the stroke; the last from where a slide down lands under no pressure, below which no stem can be sent."""
 SMALLEST, LARGEST = 1e-3, 0.1
 ENDED = 1e-3
 SMOOTH = 1.05
@@ -65,6 +66,12 @@ def valve_of(case: str) -> ValveFile:
     if case == "soft, smooth packing":
         valve["static_n"] = SMOOTH * valve["coulomb_n"]
     return ValveFile.model_validate({"valve": valve, "effect": CASES[case]})
+
+
+def lowest_of(valve: ValveFile) -> float:
+    """Return the lowest reference, of the stroke."""
+    lands = (valve.valve.coulomb_n / valve.valve.spring_n_per_m) / valve.valve.stroke_m
+    return max(LOWEST, lands + ABOVE_LOWEST)
 
 
 class OwnClock:
@@ -158,12 +165,12 @@ def made(loop: Loop, references: list[float]) -> Iterator[Made]:
         before, asked_before = at[-1], reference
 
 
-def asked(steps: int, seed: int) -> list[float]:
+def asked(steps: int, seed: int, lowest: float = LOWEST) -> list[float]:
     """Return references, of the stroke."""
     rng, at = np.random.default_rng(seed), [0.6]
     for _ in range(steps):
         way = float(np.exp(rng.uniform(np.log(SMALLEST), np.log(LARGEST))) * rng.choice((-1, 1)))
-        at.append(at[-1] + (way if LOWEST <= at[-1] + way <= HIGHEST else -way))
+        at.append(at[-1] + (way if lowest <= at[-1] + way <= HIGHEST else -way))
     return at
 
 
@@ -216,8 +223,9 @@ def main() -> None:
     print(HEAD)
     for case in arguments.cases:
         for law in arguments.laws:
-            loop = Loop(valve_of(case), law, period_s, arguments.seed)
-            steps = list(made(loop, asked(arguments.steps, arguments.seed + 1)))
+            valve = valve_of(case)
+            loop = Loop(valve, law, period_s, arguments.seed)
+            steps = list(made(loop, asked(arguments.steps, arguments.seed + 1, lowest_of(valve))))
             print(row(case, law, steps), flush=True)
 
 

@@ -10,7 +10,7 @@ from config.codes import CAUSES, AlarmState, Code, EventKind, Ne107Cause, Ne107S
 from northbound.observer.words import CODES
 from positioner.control.laws.slides.states import State
 from positioner.control.laws.slides.transitions import COMMANDING, TABLE
-from positioner.control.permissives import table as permissives
+from positioner.control.permissives import PERMISSIVES
 from positioner.daemon.health.ne107 import CLASS
 from positioner.daemon.service_state import table
 from positioner.history.entries import TABLES, Entry
@@ -61,6 +61,30 @@ def with_states(document: str) -> str:
     """Return `reliability.md` with the service's states, and what permits a test, between their marks."""
     document = _between(document, STATES_BEGIN, STATES_END, table())
     return _between(document, PERMISSIVES_BEGIN, PERMISSIVES_END, permissives())
+
+
+def permissives() -> list[str]:
+    """Return the permissives as rows of a table."""
+    head = (
+        "a test needs",
+        "by",
+        "S3: `why`",
+        "when it goes away",
+        "experiment: `experiment_state`",
+        "when it goes away",
+    )
+    rows = [
+        (
+            each.condition,
+            each.key,
+            f"{int(each.why)}" if each.why else "",
+            each.excitation_later,
+            f"{int(each.experiment)}",
+            each.experiment_later,
+        )
+        for each in PERMISSIVES
+    ]
+    return [f"| {' | '.join(row)} |" for row in (head, ("---",) * len(head), *rows)]
 
 
 def with_tables(document: str) -> str:

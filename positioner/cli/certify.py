@@ -1,4 +1,4 @@
-"""`positioner certify`: bounds of the law of slides on a valve that was identified."""
+"""`positioner certify`: what is proved of the law of slides on a valve that was identified."""
 
 import argparse
 from pathlib import Path
@@ -10,7 +10,7 @@ if TYPE_CHECKING:
     from config.daemon_file import DaemonFile
     from positioner.control.laws.slides.certificate import Certificate, Refused
 
-HELP = "bound for an identified valve: where moves end, the overtravel, the slides a step (a trial); moves nothing"
+HELP = "prove for an identified valve where moves end, the overtravel, the slides a step; moves nothing"
 EXAMPLE = "positioner certify site.toml"
 
 
@@ -20,7 +20,7 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
 
 
 def run(arguments: argparse.Namespace) -> int:
-    """Print the bounds of each valve; exit status 1 where they are refused."""
+    """Print the certificate of each valve; exit status 1 where one is refused."""
     from config.daemon_file import load_valves
     from positioner.control.laws.slides.certificate import Refused
 
@@ -55,8 +55,9 @@ def _certificate(file: "DaemonFile", folder: Path) -> "Certificate | Refused":
         raise InputError(str(path), f"cannot be read: {error.strerror}") from None
     if kept.knowledge is None:
         raise InputError(str(path), kept.problem or "nothing is known of the valve yet: identify it first")
-    known = known_valve(kept.knowledge, file.valve.stroke_m)
-    return known if isinstance(known, Refused) else certified(known, SlideSettings.of(file))
+    bounds = SlideSettings.of(file)
+    known = known_valve(kept.knowledge, bounds)
+    return known if isinstance(known, Refused) else certified(known, bounds)
 
 
 def _lines(file: "DaemonFile", found: "Certificate | Refused") -> list[str]:
@@ -64,9 +65,9 @@ def _lines(file: "DaemonFile", found: "Certificate | Refused") -> list[str]:
 
     name, stroke_m = file.valve.name, file.valve.stroke_m
     if isinstance(found, Refused):
-        return [f"{name}: not bounded: {found.why}", f"{name}: to be known better: {found.parameter}"]
+        return [f"{name}: not proved: {found.why}", f"{name}: to be known better: {found.parameter}"]
     return [
-        f"{name}: bounds of valves inside the intervals of its identification; on trial: one in 1000 exceeds them",
+        f"{name}: proved for every valve inside the intervals of its identification",
         f"{name}: each move ends, within {100 * found.ends_within_m / stroke_m:.3g} % of the stroke",
         f"{name}: most slides a step {found.most_slides}",
         f"{name}: greatest overtravel {100 * found.beyond_m / stroke_m:.2f} % of the stroke",

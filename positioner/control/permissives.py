@@ -130,27 +130,3 @@ def missing(
         return CONSENT
     low_m, high_m = window_m
     return TRAVEL_WINDOW if position_m is not None and not low_m <= position_m <= high_m else None
-
-
-def table() -> list[str]:
-    """Return the permissives as rows of a table."""
-    head = (
-        "a test needs",
-        "by",
-        "S3: `why`",
-        "when it goes away",
-        "experiment: `experiment_state`",
-        "when it goes away",
-    )
-    rows = [
-        (
-            each.condition,
-            each.key,
-            f"{int(each.why)}" if each.why else "",
-            each.excitation_later,
-            f"{int(each.experiment)}",
-            each.experiment_later,
-        )
-        for each in PERMISSIVES
-    ]
-    return [f"| {' | '.join(row)} |" for row in (head, ("---",) * len(head), *rows)]

@@ -57,6 +57,7 @@ def test_a_valve_that_is_known_well_has_its_certificate(site: Path, capsys: pyte
     keep(site, KNOWN)
     assert main(["certify", str(site)]) == 0
     said = capsys.readouterr().out
+    assert "proved for every valve inside the intervals" in said
     assert "each move ends, within" in said
     assert "most slides a step" in said
 

@@ -72,16 +72,23 @@ class ScriptedStem:
         """Return how far a slide lands off its balance, m."""
         return float(self.rng.normal(0.0, self.scatter_m))
 
+    def lands_m(self, command_pa: float, direction: int) -> float:
+        """Return where slides in a direction land under a command, m, but for their scatter."""
+        return (command_pa - direction * (self.up_pa if direction > 0 else self.down_pa)) / SLOPE_PA_PER_M
+
+    def needs_m(self, direction: int) -> float:
+        """Return how far a slide must be sent from where the stem stuck, m, to break loose."""
+        return self.onward_m if direction == self.direction else self.turning_m
+
     def answer(self) -> SlideOutcome | None:
         """Let the stem answer the command in force; return what it did, None where it has answered that."""
         command_pa, answered_pa, before_m = self.commands_pa[-1], self.answered_pa, self.position_m
         if command_pa == answered_pa:
             return None
         self.answered_pa = command_pa
-        for s, friction_pa in ((1, self.up_pa), (-1, self.down_pa)):
-            lands_m = (command_pa - s * friction_pa) / SLOPE_PA_PER_M
-            needs_m = self.onward_m if s == self.direction else self.turning_m
-            if not self.stuck and s * (lands_m - self.stuck_m) >= needs_m:
+        for s in (1, -1):
+            lands_m = self.lands_m(command_pa, s)
+            if not self.stuck and s * (lands_m - self.stuck_m) >= self.needs_m(s):
                 self.position_m = min(max(lands_m + self.scattered_m(), 0.0), STROKE_M)
                 self.direction, self.stuck_m = s, self.position_m
                 break

@@ -2,13 +2,11 @@
 
 from collections.abc import Callable
 from dataclasses import replace
-from pathlib import Path
 
 import pytest
 
 from config.codes import ExperimentState, Fault, InhibitReason, Mode, Quality, State
 from config.quantities import DeviceStatus
-from docs.code_tables import PERMISSIVES_BEGIN, PERMISSIVES_END
 from positioner.control.controller_memory import Decision
 from positioner.control.permissives import (
     ASKED,
@@ -22,7 +20,6 @@ from positioner.control.permissives import (
     TIME,
     TRAVEL_WINDOW,
     Permissive,
-    table,
 )
 from positioner.control.requests import QUIET, ExperimentRequest
 from tests.control.test_controller import Bench, automatic
@@ -269,9 +266,3 @@ def test_every_row_is_tested_here_and_has_codes_of_its_own() -> None:
     assert set(PERMISSIVES) == rows
     assert len({each.experiment for each in rows}) == len(rows)
     assert ExperimentState.NONE not in {each.experiment for each in rows}
-
-
-def test_the_document_shows_the_table() -> None:
-    text = (Path(__file__).parents[2] / "docs" / "reliability.md").read_text()
-    shown = text.partition(PERMISSIVES_BEGIN)[2].partition(PERMISSIVES_END)[0].strip().splitlines()
-    assert shown == table(), "python -m docs.code_tables"

@@ -95,7 +95,8 @@ def test_a_ramp_is_led_by_half_a_way_and_carries_what_it_reaches(s: int) -> None
     assert course.takes_back(now_s, s * 2.4e-3, WAY_M, 0.0)
     assert course.takes_back(now_s, -s * 3.9e-3, WAY_M, 0.0), "it comes to the stem"
     assert not course.takes_back(now_s, -s * 4.1e-3, WAY_M, 0.0)
-    assert not course.takes_back(now_s, s * 2e-3, 0.02, 0.0), "too slow to carry it"
+    assert course.takes_back(now_s, s * 9.9e-3, 0.02, 0.0), "as much as single slides leave"
+    assert not course.takes_back(now_s, s * 10.1e-3, 0.02, 0.0), "too slow to carry it"
     assert course.lead_m(now_s + 0.8, WAY_M) == 0.0, "it has ended"
 
 
@@ -107,9 +108,9 @@ def test_three_changes_make_a_trend_and_one_ends_it() -> None:
     assert course.after(now_s + 2 * SCAN_S, 0.0615).trend == 0
 
 
-def test_a_slow_ramp_is_left_until_two_slides_cost_less_than_they_save() -> None:
-    """By hand, 53.3 um/s, m = 3 mm, away for 0.5 s: (3/2 9 mm^2 0.5 s 53.3 um/s)^(1/3) = 0.711 mm."""
+def test_a_ramp_is_left_until_two_slides_cost_less_than_they_save() -> None:
+    """By hand, 53.3 um/s, m = 3 mm: m/2, or, away for 20 s: (3/2 9 mm^2 20 s 53.3 um/s)^(1/3) = 2.433 mm."""
     course, now_s = written(0.06 + 0.02667e-3 * i for i in range(5))
-    assert course.takes_back(now_s, 0.70e-3, 3e-3, 0.5)
-    assert not course.takes_back(now_s, 0.72e-3, 3e-3, 0.5)
-    assert not course.takes_back(now_s, 0.70e-3, 3e-3, 0.0), "what it costs nobody knows yet"
+    for least_m, away_s in ((1.5e-3, 0.0), (1.5e-3, 0.5), (2.433e-3, 20.0)):
+        assert course.takes_back(now_s, 0.99 * least_m, 3e-3, away_s)
+        assert not course.takes_back(now_s, 1.01 * least_m, 3e-3, away_s)

@@ -14,7 +14,6 @@ from config.slave_file import SlaveFile
 from config.travel_table import TravelTable
 from config.valve_file import shipped_valve
 from positioner.control.requests import QUIET, Requests
-from positioner.control.travel.characteristic import Characteristic, characteristic_of
 from positioner.control.travel.course import Course, OnCourse
 from positioner.control.travel.cutoffs import HIGH, LOW, WITHIN, Cutoffs
 from positioner.control.travel.dead_band import DeadBand
@@ -50,11 +49,11 @@ TABLES = [
 
 
 @pytest.fixture(params=TABLES, ids=lambda each: f"{each['characteristic']}")
-def characteristic(request: pytest.FixtureRequest) -> Characteristic:
-    return characteristic_of(TravelTable.model_validate(request.param))
+def characteristic(request: pytest.FixtureRequest) -> SignalPath:
+    return SignalPath.of(TravelTable.model_validate(request.param))
 
 
-def test_a_characteristic_rises_stays_within_and_is_undone(characteristic: Characteristic) -> None:
+def test_a_characteristic_rises_stays_within_and_is_undone(characteristic: SignalPath) -> None:
     signals = np.linspace(0.0, 1.0, 1001).tolist()
     openings = [characteristic.opening(each) for each in signals]
     assert all(before < after for before, after in pairwise(openings))
@@ -66,7 +65,7 @@ def test_a_characteristic_rises_stays_within_and_is_undone(characteristic: Chara
 
 def test_they_are_what_they_are_called() -> None:
     equal, quick = (
-        characteristic_of(TravelTable(characteristic=name, rangeability=50.0))
+        SignalPath.of(TravelTable(characteristic=name, rangeability=50.0))
         for name in ("equal_percentage", "quick_opening")
     )
     assert (equal.opening(0.0), equal.opening(1.0)) == (0.0, 1.0)

@@ -24,6 +24,7 @@ def test_the_tables_are_those_of_today() -> None:
     assert said("codes.md") == code_tables.codes(), STALE
     assert said("law.md") == code_tables.with_transitions(said("law.md")), STALE
     assert said("history.md") == code_tables.with_tables(said("history.md")), STALE
+    assert said("reliability.md") == code_tables.with_states(said("reliability.md")), STALE
 
 
 def test_every_code_has_its_table() -> None:

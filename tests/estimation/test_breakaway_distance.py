@@ -85,7 +85,17 @@ def test_what_is_missing_is_the_next_of_kins_if_that_agrees() -> None:
     broke = BreakawayDistance(one.onward_up, turning_up=Interval(broke_m=5.2e-3, seen=True))
     assert broke.at(1, turning=True) == Interval(4e-3, 5.2e-3, seen=True), "what holds one nearly holds its kin"
     long = BreakawayDistance(one.onward_up, turning_up=Interval(broke_m=30e-3, seen=True))
-    assert long.at(1, turning=True) == one.onward_up, "a long slide says less"
+    assert long.at(1, turning=True) == Interval(4e-3, 5.5e-3, seen=True), "a long slide says less"
+
+
+def test_turning_that_is_shorter_than_going_on_is_found_though_nothing_of_it_has_held() -> None:
+    """A play that is taken up, or a packing that hardly gives way: what held the other way on says little."""
+    both = BreakawayDistance(onward_down=Interval(1.87e-3, 2.01e-3, seen=True))
+    for _ in range(12):
+        way_m = both.at(-1, turning=True).likely_m
+        went = Went(way_m, way_m * (way_m >= 1.36e-3), moved=way_m >= 1.36e-3, arrived=way_m >= 1.36e-3)
+        both = both.taught(-1, went, turning=True, local=Local())
+    assert 1.36e-3 <= both.at(-1, turning=True).likely_m <= CLOSE**2 * 1.36e-3
 
 
 def test_it_goes_over_the_travel_as_friction_over_slope_and_comes_back() -> None:

@@ -7,9 +7,10 @@
     law.known(knowledge)          what is kept over a restart, with what the law has learnt
     law.restored(knowledge)       the law with that
 
-The folder of a law has `Settings`, the class of its settings.
+The folder of a law, found by its name, has `Settings`, the class of its settings.
 """
 
+from importlib import import_module
 from typing import ClassVar, NamedTuple, Protocol, Self
 
 from config.codes import InhibitReason
@@ -109,3 +110,9 @@ class Unlearning:
     def restored(self, _knowledge: ValveKnowledge, /) -> Self:
         """Return the law as it is."""
         return self
+
+
+def law_named(name: str) -> type[LawSettings]:
+    """Return the class of a law's settings; which names there are, `config.law_names` says."""
+    settings: type[LawSettings] = import_module(f"positioner.control.laws.{name}").Settings
+    return settings

@@ -5,13 +5,8 @@
 
 Its files:
 
-    signal_path                                 from the signal to the opening, and back
-    split_range                                 the part of the signal that is this valve's
-    characteristic                              which of the four a file asks for
-    linear, equal_percentage, quick_opening     each an equation and its inverse
-    polygon                                     the same through points that a person gives
-    course                                      both of what follows, without a bump
-    low_pass, ramp                              of the opening asked for
-    cutoffs                                     beside a stop: the stem is pressed onto it
-    dead_band                                   the error at rest that is left alone
+    signal_path     from the signal to the opening, and back: split range and the four characteristics
+    course          from the reference in force to the one asked for, low-pass and ramp, without a bump
+    cutoffs         beside a stop: the stem is pressed onto it
+    dead_band       the error at rest that is left alone
 """

@@ -17,8 +17,10 @@ loose. What a slide sent by a way a taught, that went b:
 The interval shrinks by that. It widens by contradiction: where a way holds though so short a one has broken loose, d
 lies within `RAISE` of it, to either side; a way that breaks loose though so long a one has held makes held a little
 shorter than it. And by time, for friction changes: with each slide held fades.
-An interval of which one side is missing has its next of kin's, if that agrees. It is kept as in the middle of the
-travel, and goes over it as friction over slope does, φ/κ; what turning takes besides as friction.
+An interval of which one side is missing has its next of kin's, if that agrees. But once a slide of its own has broken
+loose, what held a kin is tried less a factor, each time less, until one of its own holds. For a play that is taken up
+makes turning shorter than going on, and a packing that gives way longer. It is kept as in the middle of the travel, and
+goes over it as friction over slope does, φ/κ; what turning takes besides as friction.
 """
 
 from dataclasses import dataclass, replace
@@ -30,13 +32,14 @@ LOWER, RAISE = 0.5, 1.3
 GROWS = 2.0
 """Factor, at most, from what held to what is tried next: what broke loose may have been far longer than needed."""
 KIN_FACTOR = 1.25
-"""Factor by which kin may differ: what holds one, less that, holds the other."""
+"""Factor by which kin may differ: what holds one, less that, may hold the other."""
 CLOSE = 1.1
 """Broke over held: near enough, nothing between them is tried."""
 CONTRADICTED_BOUND_FACTOR = 1.05
 """Factor to a bound that a slide has contradicted."""
-FADES = 0.999
-"""Factor on held with each slide that breaks loose: a shorter way is tried again after some hundred."""
+FADES, FADED = 0.999, 0.5
+"""Factor on held with each slide that breaks loose, so that a shorter way is tried again after some hundred; share of
+broke to which it fades, and no farther."""
 LONG = 2.0
 """Times broke: a slide longer than this says nothing."""
 SHRINKS = 0.25
@@ -97,8 +100,11 @@ class Interval:
         """Return it after a way, m, that broke loose."""
         if way_m > LONG * self.broke_m:
             return self
-        held_m = FADES * self.held_m if way_m > self.held_m else way_m / CONTRADICTED_BOUND_FACTOR
-        return Interval(held_m, min(self.broke_m, way_m), self.seen or way_m <= self.broke_m)
+        broke_m = min(self.broke_m, way_m)
+        held_m = min(self.held_m, max(FADES * self.held_m, FADED * broke_m))
+        if way_m <= self.held_m:
+            held_m = way_m / CONTRADICTED_BOUND_FACTOR
+        return Interval(held_m, broke_m, self.seen or way_m <= self.broke_m)
 
     def holding(self, way_m: float) -> "Interval":
         """Return it after a way, m, that held."""
@@ -126,10 +132,13 @@ class Interval:
         """Return it with what it lacks of a kin's, if that agrees."""
         if (self.held_m and self.broke_m < inf) or kin.broke_m <= self.held_m:
             return self
-        better = kin.seen >= self.seen if kin.broke_m < self.broke_m else kin.seen > self.seen
-        broke_m, seen = (kin.broke_m, kin.seen) if better else (self.broke_m, self.seen)
-        held_m = kin.held_m if better else kin.held_m / KIN_FACTOR
-        return Interval(self.held_m or (held_m if held_m < broke_m else 0.0), broke_m, seen)
+        if self.seen:
+            broke_m = min(self.broke_m, kin.broke_m) if kin.seen else self.broke_m
+            return Interval(min(kin.held_m, broke_m) / KIN_FACTOR, broke_m, self.seen)
+        if kin.seen or kin.broke_m < self.broke_m:
+            return Interval(self.held_m or kin.held_m, kin.broke_m, kin.seen)
+        held_m = kin.held_m / KIN_FACTOR
+        return replace(self, held_m=self.held_m or (held_m if held_m < self.broke_m else 0.0))
 
 
 UNKNOWN = Interval()

@@ -10,14 +10,15 @@ Both means fade from landing to landing; of a rounded indication only what is mo
 has the shape; the landings keep its level true.
 """
 
-from collections.abc import Iterable
-from math import inf, sqrt
+from collections.abc import Callable, Iterable
+from math import copysign, inf, sqrt
 from statistics import fmean
 
 from config.extended_valve import ExtendedValve
 from positioner.estimation.acceptance import Ratios
 from positioner.estimation.landings.landing_detector import SlideOutcome
-from positioner.estimation.landings.local_balance import WIDTH, missed_pa
+from positioner.estimation.landings.local_balance import FADING, HELD_BACK, WIDTH
+from positioner.estimation.landings.mean_nearby import mean_nearby
 from positioner.estimation.landings.static_law import StaticLaw
 
 WORSE, LEAST_OFF = 2.0, 5e-3
@@ -42,12 +43,37 @@ def extended_landing_pa(
     """
     landed = [_today(each, valve, now_s) for each in landings if each.direction == direction]
     believed_pa = 0.5 * valve.inverse.quantum_m * -straight_law(valve).b_over_c
-    drifted_pa = missed_pa(stem_m, landed, valve.landing_pa, inf, believed_pa)
+    drifted_pa = _missed_pa(stem_m, landed, valve.landing_pa, inf, believed_pa)
 
     def followed_pa(position_m: float, direction: int) -> float:
         return valve.landing_pa(position_m, direction) + drifted_pa
 
-    return followed_pa(stem_m, direction) + missed_pa(stem_m, landed, followed_pa, WIDTH * valve.stroke_m, believed_pa)
+    return followed_pa(stem_m, direction) + _missed_pa(stem_m, landed, followed_pa, WIDTH * valve.stroke_m, believed_pa)
+
+
+def _missed_pa(
+    position_m: float,
+    landed: Iterable[SlideOutcome],
+    law: Callable[[float, int], float],
+    width_m: float,
+    least_pa: float,
+) -> float:
+    """Return by what a law misses landings near a position, Pa: the mean of e_j, weighted.
+
+    Args:
+        position_m: where.
+        landed: all in one direction, the latest first.
+        law: the pressure, Pa, at a position, m, in a direction.
+        width_m: h.
+        least_pa: by which each e_j is brought nearer to 0: less says nothing.
+    """
+
+    def missed(each: SlideOutcome) -> float:
+        off_pa = each.command_pa - law(each.position_m, each.direction)
+        return copysign(max(0.0, abs(off_pa) - least_pa), off_pa)
+
+    near = [((each.position_m - position_m) / width_m, missed(each)) for each in landed]
+    return mean_nearby((apart for apart, _ in near), (off_pa for _, off_pa in near), FADING, HELD_BACK)
 
 
 def _today(each: SlideOutcome, valve: ExtendedValve, now_s: float) -> SlideOutcome:

@@ -4,22 +4,25 @@
     t       = 2 x/stroke - 1
     q       = (Q' W Q/σ^2 + P^-1)^-1 Q' W e/σ^2             e_j = p_j - (κ x_j + s_j φ + offset)
     l_s     = what q and g_s leave of all of the last e_j, s_j = s: the least of them if they have one sign, else 0
-    n_s(x)  = Σ w_j e'_j / (w_0 + Σ w_j)                    e'_j what q and l_s leave of e_j,  s_j = s
+    n_s(x)  = Σ w_j e'_j / (w_0 + Σ w_j)                    e'_j what q, g_s and l_s leave of e_j,  s_j = s
     w_j     = exp(-((x_j - x) / h)^2 / 2) ρ^(landings of direction s since j)
 
-    B(x_0, x, s) = B(x, s) - s κ g_s(abs(x - x_0))       of a slide from x_0: g_s of what q leaves (short_slides.py),
-                                                         n_s of what g_s and l_s leave
+    B(x_0, x, s) = B(x, s) - s κ g_s(abs(x - x_0))       of a slide from x_0: g_s of what q leaves (short_slides.py)
 
 A spring that hardens bends both lines alike (t^2, t^3), friction that grows over the travel makes them part (s t): two
 or three numbers, which the landings of S3 give. P holds them to what such valves have; W, Huber's, counts a landing
 that lies apart for less, and that of a short slide, and σ is what the others lie off by. A slide to x that missed all
 the same says what is missing there: the next one lands. w_0 holds that correction back where there is little to go by.
 Friction that drifts makes the last slides miss alike everywhere: l_s.
+
+All of this together stays among what was seen, B(x, s) - (κ x + s φ + offset) within min(0, e_j) to max(0, e_j): no
+bend is carried on beyond its landings. So a law cannot make itself worse than the valve differs from place to place
+(`control/laws/slides/certificate.py`).
 """
 
-from collections.abc import Callable, Iterable, Iterator, Sequence
+from collections.abc import Iterable, Iterator, Sequence
 from functools import lru_cache
-from math import copysign, sqrt
+from math import sqrt
 from typing import NamedTuple
 
 import numpy as np
@@ -75,14 +78,7 @@ def landing_pa(
         landings: the latest first.
         stroke_m: full travel.
     """
-    bend = _bend(ratios, tuple(landings), stroke_m)
-
-    def bent_pa(position_m: float, direction: int) -> float:
-        return _bent_pa(position_m, direction, ratios, bend, stroke_m)
-
-    landed = (each for each in landings if each.direction == direction)
-    missed = missed_pa(position_m, landed, bent_pa, WIDTH * stroke_m)
-    return bent_pa(position_m, direction) + missed
+    return sliding_pa(position_m, position_m, direction, ratios, landings, stroke_m)
 
 
 def sliding_pa(
@@ -100,29 +96,24 @@ def sliding_pa(
         direction, ratios, landings, stroke_m: as of `landing_pa`.
     """
     bend = _bend(ratios, tuple(landings), stroke_m)
-    way = bend.ways[direction > 0]
-    bent_pa = _bent_pa(to_m, direction, ratios, bend, stroke_m)
-    near_pa = mean_nearby(((each_m - to_m) / (WIDTH * stroke_m) for each_m in way.at_m), way.left_pa, FADING, HELD_BACK)
-    return bent_pa + near_pa + direction * ratios.b_over_c * beyond_m(abs(to_m - from_m), way.sent)
+    way, apart_m = bend.ways[direction > 0], WIDTH * stroke_m
+    near_pa = mean_nearby(((each_m - to_m) / apart_m for each_m in way.at_m), way.left_pa, FADING, HELD_BACK)
+    way_m = abs(to_m - from_m)
+    short_pa = direction * ratios.b_over_c * beyond_m(way_m, way.sent) if way_m else 0.0
+    off_pa = bend.bent_by_pa(to_m / stroke_m, direction) + way.lately_pa + near_pa + short_pa
+    return ratios.balance_pa(to_m, direction) + bend.seen_pa(off_pa)
 
 
 def bent_by_pa(
     position_m: float, direction: int, ratios: Ratios, landings: Sequence[SlideOutcome], stroke_m: float
 ) -> float:
     """Return by how much the landings are bent away from the straight law at a position, Pa; as of `landing_pa`."""
-    bend = _bend(ratios, tuple(landings), stroke_m)
-    return _bent_by_pa(bend.q, position_m / stroke_m, direction)
+    return _bend(ratios, tuple(landings), stroke_m).bent_by_pa(position_m / stroke_m, direction)
 
 
 def scatter_m(ratios: Ratios, landings: Sequence[SlideOutcome], stroke_m: float) -> float:
     """Return how far slides scatter from one to the next, a standard deviation, m; arguments as of `landing_pa`."""
     return _bend(ratios, tuple(landings), stroke_m).scatter_pa / -ratios.b_over_c
-
-
-def _bent_by_pa(bend: tuple[float, ...], share: float, direction: int) -> float:
-    t, s = 2.0 * share - 1.0, direction
-    level, friction, slope, square, cube, parting = bend
-    return level + friction * s + t * (slope + t * (square + t * cube) + parting * s)
 
 
 class _Way(NamedTuple):
@@ -144,12 +135,19 @@ class _Bend(NamedTuple):
     """Of the landings from one to the next, a standard deviation: friction that drifts is gone by, and no scatter."""
     ways: tuple[_Way, ...]
     """Down and up."""
+    least_pa: float
+    most_pa: float
+    """Of e_j, and 0."""
 
+    def seen_pa(self, off_pa: float) -> float:
+        """Return what of a correction has been seen, Pa: the nearest of what landings lay off the straight law by."""
+        return min(max(off_pa, self.least_pa), self.most_pa)
 
-def _bent_pa(position_m: float, direction: int, ratios: Ratios, bend: _Bend, stroke_m: float) -> float:
-    """Return B without n_s, Pa: the straight law, l_s and q."""
-    straight_pa = ratios.balance_pa(position_m, direction) + bend.ways[direction > 0].lately_pa
-    return straight_pa + _bent_by_pa(bend.q, position_m / stroke_m, direction)
+    def bent_by_pa(self, share: float, direction: int) -> float:
+        """Return what q says at a share of the stroke, Pa."""
+        t, s = 2.0 * share - 1.0, direction
+        level, friction, slope, square, cube, parting = self.q
+        return self.seen_pa(level + friction * s + t * (slope + t * (square + t * cube) + parting * s))
 
 
 _STRAIGHT = (0.0,) * len(BENDS)
@@ -158,11 +156,13 @@ _STRAIGHT = (0.0,) * len(BENDS)
 @lru_cache(maxsize=4)
 def _bend(ratios: Ratios, landings: tuple[SlideOutcome, ...], stroke_m: float) -> _Bend:
     """Return what landings say; q is zeros where there are too few."""
+    off_pa = [each.command_pa - ratios.balance_pa(each.position_m, each.direction) for each in landings]
+    seen_pa = (min(0.0, *off_pa), max(0.0, *off_pa)) if off_pa else (0.0, 0.0)
     if len(landings) < FEWEST_BEND_LANDINGS:
-        return _Bend(_STRAIGHT, FINEST * -ratios.b_over_c * stroke_m, tuple(_few(landings, ratios)))
+        return _Bend(_STRAIGHT, FINEST * -ratios.b_over_c * stroke_m, tuple(_few(landings, ratios)), *seen_pa)
     s = np.array([float(each.direction) for each in landings])
     t = np.array([2.0 * each.position_m / stroke_m - 1.0 for each in landings])
-    e = np.array([each.command_pa - ratios.balance_pa(each.position_m, each.direction) for each in landings])
+    e = np.array(off_pa)
     Q = np.column_stack((np.ones(s.size), s, t, t**2, t**3, s * t))
     stroke_pa = -ratios.b_over_c * stroke_m
     friction_m = ratios.k_over_c / ratios.b_over_c
@@ -181,7 +181,7 @@ def _bend(ratios: Ratios, landings: tuple[SlideOutcome, ...], stroke_m: float) -
     landed = list(zip(landings, left_pa.tolist(), strict=True))
     ways = (_way([each for each in landed if each[0].direction == way], -ratios.b_over_c) for way in (-1, 1))
     scatter_pa = _scatter_pa(left_pa[s == way] for way in (-1.0, 1.0))
-    return _Bend(tuple(q.tolist()), max(FINEST * stroke_pa, scatter_pa), tuple(ways))
+    return _Bend(tuple(q.tolist()), max(FINEST * stroke_pa, scatter_pa), tuple(ways), *seen_pa)
 
 
 def _weights_by_length(landings: Sequence[SlideOutcome], s: Array, friction_m: float) -> Array:
@@ -228,28 +228,3 @@ def _alike(missed_pa: Sequence[float]) -> float:
     if len(missed_pa) < LATEST_LANDINGS:
         return 0.0
     return max(0.0, min(missed_pa)) + min(0.0, max(missed_pa))
-
-
-def missed_pa(
-    position_m: float,
-    landed: Iterable[SlideOutcome],
-    law: Callable[[float, int], float],
-    width_m: float,
-    least_pa: float = 0.0,
-) -> float:
-    """Return by what a law misses landings near a position, Pa: the mean of e_j, weighted.
-
-    Args:
-        position_m: where.
-        landed: all in one direction, the latest first.
-        law: the pressure, Pa, at a position, m, in a direction.
-        width_m: h.
-        least_pa: by which each e_j is brought nearer to 0: less says nothing.
-    """
-
-    def missed(each: SlideOutcome) -> float:
-        off_pa = each.command_pa - law(each.position_m, each.direction)
-        return copysign(max(0.0, abs(off_pa) - least_pa), off_pa)
-
-    near = [((each.position_m - position_m) / width_m, missed(each)) for each in landed]
-    return mean_nearby((apart for apart, _ in near), (off_pa for _, off_pa in near), FADING, HELD_BACK)

@@ -111,8 +111,9 @@ class StaticLaw:
         return Estimate((self.up.value - self.down.value) / 2, std, self.reason)
 
     def contradicts(self, ratios: Ratios, stroke_m: float) -> bool:
-        """Whether ratios land elsewhere than the stem did: beyond three deviations, in the middle of either line.
+        """Whether ratios land elsewhere than the stem did: beyond three deviations, amid the landings of a direction.
 
+        There, at their weighted mean, the law is known best, and lies no farther off the ratios than a landing does.
         Of a direction in which they know no friction they say nothing.
         """
         if not self.valid:
@@ -120,7 +121,8 @@ class StaticLaw:
         theta = np.array((self.slope.value, self.up.value, self.down.value))
         theirs = np.array((-ratios.b_over_c, ratios.friction_pa(1), ratios.friction_pa(-1)))
         for direction in {1, -1} - {ratios.directions.unseen}:
-            row = np.array((0.5 * stroke_m, float(direction > 0), -float(direction < 0)))
+            row = np.array((0.0, float(direction > 0), -float(direction < 0)))
+            row[0] = -float(row @ self.covariance[0]) / self.covariance[0, 0]
             shift_pa = abs(float(row @ (theta - theirs)))
             std_pa = sqrt(float(row @ self.covariance @ row))
             if shift_pa > max(DEVIATIONS * std_pa, LEAST_SHIFT * stroke_m * self.slope.value):
@@ -229,16 +231,16 @@ def _slides(landings: Sequence[SlideOutcome], X: Array, p: Array, stroke_m: floa
 
 
 def _huber(X: Array, p: Array) -> tuple[Array, Array]:
-    """Return theta by least squares with Huber's weights, and the weights; the scale is the median deviation."""
+    """Return theta by least squares with Huber's weights, and these weights; the scale is the median deviation."""
     weights: Array = np.ones(p.size)
-    theta: Array = np.zeros(3)
+    theta, used = np.zeros(3), weights
     for _ in range(ROUNDS):
-        root = np.sqrt(weights)
+        used, root = weights, np.sqrt(weights)
         theta = np.asarray(np.linalg.lstsq(root[:, None] * X, root * p)[0])
         off = np.abs(p - X @ theta)
         scale = 1.4826 * float(np.median(off)) * sqrt(p.size / (p.size - 3))
         weights = np.minimum(1.0, HUBER * max(scale, 1e-9) / np.maximum(off, 1e-9))
-    return theta, weights
+    return theta, used
 
 
 def t_of_three_deviations(free: int) -> float:

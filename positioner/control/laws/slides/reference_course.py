@@ -1,7 +1,7 @@
 """How the reference comes: does it rest, or will the next one take back what would be corrected now?
 
 A DCS's controller, a ramp or a filter writes a new reference at each of its scans, Δ s. Of such a run of changes
-d_1, d_2, ... (the latest first; each at most `SCAN_S` after the one before) is known
+d_1, d_2, ... (the latest first; each at most `scan_s` after the one before) is known
 
     Δ = the longest of the last intervals,   D = mean abs(d_i),   s_r = the sign of the last three d_i, 0 if they differ
 
@@ -9,6 +9,7 @@ and the reference has come to rest when it has stood for 1.5 Δ. Until then, of 
 
     abs(e) <= 3 D                      left alone: the next references may take it back
     e carried by N = 8 references      left alone: a ramp brings it within the reach of one slide, or back to the stem
+    abs(e) <= m/2 on a ramp            left alone: single slides leave as much
     e^3 <= 3/2 m^2 T v on a ramp       left alone: two slides would cost more than they save
     else                               corrected as if the reference rested
 
@@ -39,22 +40,7 @@ from itertools import accumulate
 from operator import sub
 from statistics import median
 
-SCAN_S = 1.2
-"""A DCS writes at least so often, or it writes steps."""
-KEPT = 6
-"""Changes."""
-OVERDUE = 1.5
-"""Intervals: then no further one comes."""
-TAKEN_BACK = 3.0
-"""D: a stem so far off is not met by chance."""
-GOES_ON = 0.7
-"""Of the sum of all changes, without their signs: a run that goes so far goes somewhere."""
-COMING = 8
-"""N"""
-A_TREND = 3
-"""Changes in one direction."""
-STEPS_ALIKE, ALIKE_STEP_FACTOR = 4, 2.0
-"""Steps that are a slow ramp; by which factor they and their intervals may differ: steps of a hand hardly do so."""
+from positioner.control.laws.slides.slide_bounds import THRESHOLDS
 
 
 @dataclass(frozen=True, slots=True)
@@ -75,32 +61,33 @@ class ReferenceCourse:
         if reference_m == self.value_m:
             return self
         interval_s = now_s - self.changed_s
-        if interval_s > SCAN_S:
-            steps = ((reference_m - self.value_m, interval_s), *self.steps)[:STEPS_ALIKE]
+        if interval_s > THRESHOLDS.scan_s:
+            steps = ((reference_m - self.value_m, interval_s), *self.steps)[: THRESHOLDS.steps_alike]
             return ReferenceCourse(reference_m, now_s, steps=steps)
         change_m = reference_m - self.value_m
         turns = self.turned_m is None or (bool(self.changes_m) and change_m * self.changes_m[0] < 0.0)
         return ReferenceCourse(
             reference_m,
             now_s,
-            (change_m, *self.changes_m)[:KEPT],
-            (interval_s, *self.intervals_s)[:KEPT],
+            (change_m, *self.changes_m)[: THRESHOLDS.references_kept],
+            (interval_s, *self.intervals_s)[: THRESHOLDS.references_kept],
             self.value_m if turns else self.turned_m,
         )
 
     def slow_ramp_m_per_s(self, now_s: float) -> float:
         """Return the rate of a ramp that is written in steps, m/s; 0: there is none, or it has come to its end."""
-        if len(self.steps) < STEPS_ALIKE:
+        if len(self.steps) < THRESHOLDS.steps_alike:
             return 0.0
         ways_m, intervals_s = zip(*self.steps, strict=True)
         least_m, most_m = sorted((min(ways_m), max(ways_m)), key=abs)
-        alike = 0.0 < most_m / least_m <= ALIKE_STEP_FACTOR and max(intervals_s) <= ALIKE_STEP_FACTOR * min(intervals_s)
-        goes_on = now_s - self.changed_s <= OVERDUE * max(intervals_s)
+        factor = THRESHOLDS.alike_step_factor
+        alike = 0.0 < most_m / least_m <= factor and max(intervals_s) <= factor * min(intervals_s)
+        goes_on = now_s - self.changed_s <= THRESHOLDS.overdue * max(intervals_s)
         return abs(sum(ways_m)) / sum(intervals_s) if alike and goes_on else 0.0
 
     def rests(self, now_s: float) -> bool:
         """Whether no next reference is to be waited for."""
-        return not self.intervals_s or now_s - self.changed_s > OVERDUE * max(self.intervals_s)
+        return not self.intervals_s or now_s - self.changed_s > THRESHOLDS.overdue * max(self.intervals_s)
 
     @property
     def change_m(self) -> float:
@@ -115,8 +102,8 @@ class ReferenceCourse:
     @property
     def trend(self) -> int:
         """s_r: +1 or -1 while it goes on in one direction."""
-        last_m = self.changes_m[:A_TREND]
-        if len(last_m) < A_TREND:
+        last_m = self.changes_m[: THRESHOLDS.a_trend]
+        if len(last_m) < THRESHOLDS.a_trend:
             return 0
         return 1 if min(last_m) > 0.0 else -1 if max(last_m) < 0.0 else 0
 
@@ -130,7 +117,7 @@ class ReferenceCourse:
         They step where they lie a slide of way_m, the shortest, or more apart.
         """
         net_m, sum_m = abs(sum(self.changes_m)), sum(abs(each) for each in self.changes_m)
-        if len(self.changes_m) < A_TREND or net_m > GOES_ON * sum_m or self.rests(now_s):
+        if len(self.changes_m) < THRESHOLDS.a_trend or net_m > THRESHOLDS.goes_somewhere * sum_m or self.rests(now_s):
             return self.value_m
         last_m = tuple(accumulate(self.changes_m, sub, initial=self.value_m))
         return median(last_m) if max(last_m) - min(last_m) < way_m else self.value_m
@@ -139,7 +126,8 @@ class ReferenceCourse:
         """Return how far ahead of the reference, m, signed, a slide is to land, the shortest of which is way_m."""
         if self.rests(now_s):
             return 0.0
-        return self.trend * (0.5 * way_m if self.goes_far(way_m) else min(0.5 * way_m, COMING * self.change_m))
+        coming_m = THRESHOLDS.coming * self.change_m
+        return self.trend * (0.5 * way_m if self.goes_far(way_m) else min(0.5 * way_m, coming_m))
 
     def takes_back(self, now_s: float, error_m: float, way_m: float, away_s: float) -> bool:
         """Whether an error r - x, m, is left to the references to come.
@@ -152,12 +140,12 @@ class ReferenceCourse:
         """
         if self.rests(now_s):
             return abs(error_m) ** 3 <= 1.5 * way_m**2 * away_s * self.slow_ramp_m_per_s(now_s)
-        if abs(error_m) <= TAKEN_BACK * self.change_m or self.goes_far(way_m):
+        if abs(error_m) <= THRESHOLDS.taken_back * self.change_m or self.goes_far(way_m):
             return True
-        coming_m = COMING * self.change_m
+        coming_m = THRESHOLDS.coming * self.change_m
         if self.trend * error_m < 0.0:
             return abs(error_m) <= coming_m
         if self.trend == 0:
             return False
-        costs_more = abs(error_m) ** 3 <= 1.5 * way_m**2 * away_s * self.rate_m_per_s
+        costs_more = abs(error_m) <= max(0.5 * way_m, (1.5 * way_m**2 * away_s * self.rate_m_per_s) ** (1 / 3))
         return costs_more or abs(error_m) + coming_m + abs(self.lead_m(now_s, way_m)) >= way_m

@@ -12,6 +12,7 @@ from collections.abc import Sequence
 from dataclasses import dataclass, replace
 
 from config.extended_valve import ExtendedValve
+from positioner.control.laws.slides.slide_bounds import THRESHOLDS
 from positioner.estimation.acceptance import Ratios
 from positioner.estimation.landings.breakaway_distance import BreakawayDistance, Interval, Local
 from positioner.estimation.landings.extended_balance import extended_landing_pa
@@ -19,17 +20,6 @@ from positioner.estimation.landings.landing_detector import VISIBLE, SlideOutcom
 from positioner.estimation.landings.local_balance import bent_by_pa, landing_pa, scatter_m, sliding_pa
 from positioner.estimation.landings.packing_compliance import Compliance, compliance
 from positioner.estimation.landings.short_slides import ALIKE
-
-MIDDLE = 0.5
-"""Of the stroke: where break-away distances are kept."""
-KNOWN = 1e-3
-"""Of the stroke: how well an extended valve is known."""
-SURE = 1.02
-"""Factor on a margin that is known: a slide of just that length may hold."""
-SLOPE_REACH_SHARE = 0.02
-"""Of the stroke, to either side: by what is between, a slope is known."""
-FLATTEST = 0.25
-"""Of the slope of the straight law, and of its friction: no valve has less of it anywhere."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -75,7 +65,11 @@ class Balance:
     @property
     def scatter_m(self) -> float:
         """How far slides land off the balance, a standard deviation, m."""
-        return scatter_m(self.ratios, self.landings, self.stroke_m) if self.valve is None else KNOWN * self.stroke_m
+        return (
+            scatter_m(self.ratios, self.landings, self.stroke_m)
+            if self.valve is None
+            else THRESHOLDS.extended_known * self.stroke_m
+        )
 
     @property
     def friction_m(self) -> float:
@@ -85,20 +79,20 @@ class Balance:
     def friction_at_m(self, position_m: float) -> float:
         """Return φ/κ at a place, κ of the straight law, m."""
         apart_pa = self._shape_pa(position_m, 1) - self._shape_pa(position_m, -1)
-        return max(FLATTEST * self.friction_m, 0.5 * apart_pa / -self.ratios.b_over_c)
+        return max(THRESHOLDS.flattest * self.friction_m, 0.5 * apart_pa / -self.ratios.b_over_c)
 
     def going_on_m(self, position_m: float, direction: int) -> float:
         """Return what margins of slides that go on are in proportion to, m: m_s of an extended valve, or φ/κ."""
         if self.valve is not None:
-            return max(SURE * self.valve.margin_m(position_m, direction), VISIBLE * self.stroke_m)
-        there_m = [position_m + each * SLOPE_REACH_SHARE * self.stroke_m for each in (-1, 1)]
+            return max(THRESHOLDS.return_margin * self.valve.margin_m(position_m, direction), VISIBLE * self.stroke_m)
+        there_m = [position_m + each * THRESHOLDS.slope_reach * self.stroke_m for each in (-1, 1)]
         down_pa, up_pa = (sum(self._shape_pa(each, s) for s in (1, -1)) for each in there_m)
-        straight_pa = -self.ratios.b_over_c * 4 * SLOPE_REACH_SHARE * self.stroke_m
-        return self.friction_at_m(position_m) / max(FLATTEST, (up_pa - down_pa) / straight_pa)
+        straight_pa = -self.ratios.b_over_c * 4 * THRESHOLDS.slope_reach * self.stroke_m
+        return self.friction_at_m(position_m) / max(THRESHOLDS.flattest, (up_pa - down_pa) / straight_pa)
 
     def local(self, position_m: float) -> Local:
         """Return what break-away distances at a place are of those in the middle of the travel."""
-        middle_m = MIDDLE * self.stroke_m
+        middle_m = THRESHOLDS.middle * self.stroke_m
         up, down = (self.going_on_m(position_m, s) / self.going_on_m(middle_m, s) for s in (1, -1))
         return Local(up, down, self.friction_at_m(position_m) / self.friction_at_m(middle_m))
 
@@ -110,8 +104,8 @@ class Balance:
             told: whether that is known, and no guess.
         """
         if self.valve is not None:
-            up_m, down_m = (self.going_on_m(MIDDLE * self.stroke_m, s) for s in (1, -1))
-            up, down = (Interval(each / SURE, each, seen=True) for each in (up_m, down_m))
+            up_m, down_m = (self.going_on_m(THRESHOLDS.middle * self.stroke_m, s) for s in (1, -1))
+            up, down = (Interval(each / THRESHOLDS.return_margin, each, seen=True) for each in (up_m, down_m))
             return BreakawayDistance(up, down, up, down)
         return BreakawayDistance(*(self._first(s, Interval(broke_m=guess_m, seen=told)) for s in (1, -1)))
 

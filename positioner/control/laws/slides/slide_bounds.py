@@ -64,6 +64,36 @@ class SlideThresholds:
     """s, in which two slides come back to a move that has used them up."""
     stuck_after: int = 3
     """Slides in a row that hold, each as long as has broken loose: one may be luck, and friction grows."""
+    middle: float = 0.5
+    """Of the stroke: where break-away distances are kept."""
+    extended_known: float = 1e-3
+    """Of the stroke: how well an extended valve is known."""
+    slope_reach: float = 0.1
+    """Of the stroke, to either side: by what is between, a slope is known; by less, a landing amiss would bend it."""
+    flattest: float = 0.25
+    """Of the slope of the straight law, and of its friction: no valve has less of it anywhere."""
+    scan_s: float = 1.2
+    """s: a DCS writes at least so often, or it writes steps."""
+    references_kept: int = 6
+    """Changes of the reference: of these its course is told."""
+    overdue: float = 1.5
+    """Of the longest of their intervals: then no further one comes."""
+    taken_back: float = 3.0
+    """Mean changes, D: a stem so far off is not met by chance."""
+    goes_somewhere: float = 0.7
+    """Of the sum of all changes, without their signs: a run that goes so far goes somewhere."""
+    coming: int = 8
+    """References to come, N, that a ramp is counted on for."""
+    a_trend: int = 3
+    """Changes in one direction: fewer are chance."""
+    steps_alike: int = 4
+    """Steps that are a slow ramp ..."""
+    alike_step_factor: float = 2.0
+    """... and the factor by which they and their intervals may differ: steps of a hand hardly do so."""
+
+
+THRESHOLDS = SlideThresholds()
+"""Of the law as it is."""
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -83,7 +113,7 @@ class SlideBounds:
     """Travel that they may cost, of which a day's may be spent at once; 0: no limit."""
     command_step_pa: float = 0.0
     """The least difference of two commands that the device is told."""
-    thresholds: SlideThresholds = SlideThresholds()
+    thresholds: SlideThresholds = THRESHOLDS
 
     def allowed_pa(self, pressure_pa: float) -> float:
         """Return the allowed pressure, Pa, that is nearest to one; NaN of one that is not finite."""

@@ -51,11 +51,17 @@ def _after_slide(memory: SlideMemory, outcome: SlideOutcome, now: "Now") -> Slid
         return replace(landed, distances=memory.learnt)
     scatter_m = max(thresholds.missed_deviations * now.balance.scatter_m, outcome.std_m)
     near_m = max(near_m, now.bounds.dead_band_m)
-    far_short = way_m - went_m > thresholds.far_short * way_m
-    elsewhere = missed_m > near_m and (far_short or now.balance.tried(way_m, s) > 1)
+    elsewhere = _went_elsewhere(slide, went_m, near_m, now)
     if not elsewhere and missed_m > max(near_m, scatter_m):
         return landed
     return _taught(landed, slide, Went(way_m, went_m, moved=True, arrived=not elsewhere), now)
+
+
+def _went_elsewhere(slide: Slide, went_m: float, near_m: float, now: "Now") -> bool:
+    """Whether a slide did not arrive: far short of its way, or off by more than is near, the second time on end."""
+    way_m, missed_m = slide.way_m, abs(slide.way_m - went_m)
+    far_short = way_m - went_m > now.bounds.thresholds.far_short * way_m
+    return missed_m > near_m and (far_short or now.balance.tried(way_m, slide.direction) > 1)
 
 
 def _after_presliding(memory: SlideMemory, state: Presliding, outcome: SlideOutcome, now: "Now") -> SlideMemory:
@@ -80,7 +86,7 @@ def sent_elsewhere(memory: SlideMemory, slide: Slide, now: "Now") -> SlideMemory
     memory, way_m, went_m = replace(memory, row=None), slide.way_m, slide.went_m(position_m)
     if not (1.0 - thresholds.missed) * way_m < went_m < thresholds.gone_on * way_m:
         return memory
-    jumped = went_m - way_m > max(2.0 * thresholds.missed * way_m, now.seen.quantum_m)
+    jumped = _went_elsewhere(slide, went_m, max(2.0 * thresholds.missed * way_m, now.seen.quantum_m), now)
     return _taught(memory, slide, Went(way_m, went_m, moved=True, arrived=not jumped), now)
 
 

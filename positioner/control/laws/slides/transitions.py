@@ -248,18 +248,19 @@ def excursion_waits(memory: SlideMemory, now: Now) -> SlideMemory | None:
     return _idle(memory, InhibitReason.EXCURSION_WAITS)
 
 
-def two_slides(memory: SlideMemory, now: Now) -> SlideMemory | None:
-    """Give the first of two slides, by whichever side it may, and what is left of the day's travel allows."""
+def two_slides(memory: SlideMemory, now: Now) -> SlideMemory:
+    """Give the first of two slides, by whichever side it may, and what is left of the day's travel allows; or end."""
     seen, bounds = now.seen, now.bounds
     if memory.move.left < 2:  # it is to come back
         return _barred(memory, now, InhibitReason.TRIM_ENDED)
     from_m = _standing_m(memory, now)
     plan, spent = now.plan(memory, from_m), memory.excursions
-    begun = memory.move.begun or bool(memory.course and memory.course.changes_m)
+    begun, reasons = memory.move.begun or bool(memory.course and memory.course.changes_m), []
     for each in plan.excursions(begun=begun):
         spent_m = (spent.spent_at_m(seen.now_s, bounds) if spent else 0.0) + 2 * each.beyond_m
         broke = 0.0 < day_m(bounds) < spent_m and not _left_away(memory, now)
-        if plan.barred(each) is not NOTHING or broke:
+        reasons.append(plan.barred(each) or (InhibitReason.EXCURSION_BUDGET_SPENT if broke else NOTHING))
+        if reasons[-1] is not NOTHING:
             continue
         slide = _slide_from(memory, from_m, each.by_m, each.direction)
         command_pa = bounds.allowed_pa(now.balance.slide_pa(from_m, each.by_m, each.direction))
@@ -279,18 +280,9 @@ def two_slides(memory: SlideMemory, now: Now) -> SlideMemory | None:
             move=memory.move.given(seen.now_s, None),
             excursions=Excursions(seen.now_s, spent.away_s if spent else 0.0, spent_m),
         )
-    return None
-
-
-def no_excursion(memory: SlideMemory, now: Now) -> SlideMemory:
-    """End the move: a bound of the site bars each excursion."""
-    plan = now.plan(memory, _standing_m(memory, now))
-    reasons = [plan.barred(each) for each in plan.excursions(begun=memory.move.begun)]
-    if NOTHING in reasons:
+    if InhibitReason.EXCURSION_BUDGET_SPENT in reasons:
         return _idle(memory, InhibitReason.EXCURSION_BUDGET_SPENT)
-    beyond_pressure = InhibitReason.LAW_BEYOND_LIMITS in reasons
-    why = InhibitReason.LAW_BEYOND_LIMITS if beyond_pressure else InhibitReason.EXCURSION_BEYOND_LIMIT
-    return _barred(memory, now, why)
+    return _barred(memory, now, max(reasons, key=lambda each: each is InhibitReason.LAW_BEYOND_LIMITS))
 
 
 def _rest(now: Now) -> Rest:
@@ -429,8 +421,7 @@ AT_REST = (
     Rule(COMMANDING, preslid, (Presliding,), "the packing gives way as far as the reference"),
     Rule(COMMANDING, taken_back, (Idle,), "references to come take the error back"),
     Rule(COMMANDING, excursion_waits, (Idle,), "the last excursion was too recent"),
-    Rule(COMMANDING, two_slides, (Out, Idle, Stuck), "an excursion is within the site's bounds"),
-    Rule(COMMANDING, no_excursion, (Idle, Stuck), "none is"),
+    Rule(COMMANDING, two_slides, (Out, Idle, Stuck), "else: an excursion, where the site's bounds let it"),
 )
 TABLE = (*MOVING, *AT_REST)
 
@@ -438,8 +429,7 @@ TABLE = (*MOVING, *AT_REST)
 def after(memory: SlideMemory, now: Now) -> SlideMemory:
     """Return the memory after the first rule that holds and leads to a state; one that leads to none only teaches."""
     rest = now.seen.rest
-    if rest is not None:
-        memory = settled(memory, now, rest)
+    memory = memory if rest is None else settled(memory, now, rest)
     for rule in MOVING if rest is None else AT_REST:
         if isinstance(memory.state, rule.of) and (followed := rule.follow(memory, now)) is not None:
             if rule.to:
