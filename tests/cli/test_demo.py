@@ -33,6 +33,8 @@ from tests.cli.test_daemon_process import until
 
 pytestmark = pytest.mark.real_time
 
+SOON_AGED_S = 8.0
+
 
 def outcome(
     error_pu: float = 0.001, ratio: float = 1.0, *, phase: str = "new", limit_pu: float | None = LARGEST_ERROR_PU
@@ -59,13 +61,19 @@ def test_what_does_not_hold_is_a_problem(result: DemoOutcome, holds: bool) -> No
 
 
 def test_it_ends_soon_and_leaves_picture_recording_and_figures(
-    tmp_path: Path, capsys: pytest.CaptureFixture[str]
+    tmp_path: Path, capsys: pytest.CaptureFixture[str], monkeypatch: pytest.MonkeyPatch
 ) -> None:
+    """Of each phase two steps, or a small one; the packing ages as soon as the first may be over."""
+    fewer = {"STEPS": demo.STEPS[:2], "SLIDES_STEPS": demo.SLIDES_STEPS[:1], "SMALL_STEPS": demo.SMALL_STEPS[:1]}
+    for name, steps in fewer.items():
+        monkeypatch.setattr(demo, name, steps)
+    for module in (demo, simulated_plant):
+        monkeypatch.setattr(module, "AGES_AT_S", SOON_AGED_S)
     status = main(["demo", "--out", str(tmp_path / "out"), "--json", str(tmp_path / "out.json")])
     told = json.loads((tmp_path / "out.json").read_text())
     assert status == (1 if told["problems"] else 0), capsys.readouterr().out
     assert told["seconds"] < 180
-    phases = {"new": 5, "aged": 5, "identified anew": 5, "small steps": 3, "slides": 5}
+    phases = {"new": 2, "aged": 2, "identified anew": 2, "small steps": 1, "slides": 2}
     assert Counter(step["phase"] for step in told["steps"]) == phases
     by_phase = {phase: [each["name"] for each in told["identified"] if each["phase"] == phase] for phase in phases}
     paper = ["a", "b", "c", "k", "b_over_c", "k_over_c"]
