@@ -61,9 +61,9 @@ class CanopenDriver:
         self._config = config
         self._bus = NodeBus(config)
         self._watcher = NodeWatcher(config, self._bus)
-        self._sdo = SdoTransfers(config, sheet, self._bus, self._watcher)
-        self._pdos = PdoExchange(config, sheet, self._bus, self._watcher)
-        self._configuration = NodeConfiguration(config, sheet, self._bus, self._watcher, self._sdo, self._pdos)
+        self.sdo = SdoTransfers(config, sheet, self._bus, self._watcher)
+        self.pdos = PdoExchange(config, sheet, self._bus, self._watcher)
+        self._configuration = NodeConfiguration(config, sheet, self._bus, self._watcher, self.sdo, self.pdos)
         self._activation = Activation(config.map, self._bus)
         self._said_alive_s = -math.inf
         self._has_driven = False
@@ -72,7 +72,7 @@ class CanopenDriver:
     def capabilities(self) -> Capabilities:
         """What the device can do."""
         capabilities = capabilities_of(self._config)
-        return replace(capabilities, sample_counter=capabilities.sample_counter or self._pdos.come_by_themselves)
+        return replace(capabilities, sample_counter=capabilities.sample_counter or self.pdos.come_by_themselves)
 
     def open(self) -> float:
         """Configure and start the node; return the command in force in it, in Pa. Moves nothing.
@@ -84,16 +84,16 @@ class CanopenDriver:
         try:
             own_ids = tuple(first + self._config.node for first in (EMERGENCY, SDO_ANSWER, HEARTBEAT))
             self._bus.open(own_ids)
-            self._sdo.open()
+            self.sdo.open()
             if self._has_driven:
-                self._watcher.was_interrupted |= self._sdo.hears_stopped()
-            set_point_pa = self._sdo.held_command_pa(self._config.map.command_pa)
+                self._watcher.was_interrupted |= self.sdo.hears_stopped()
+            set_point_pa = self.sdo.held_command_pa(self._config.map.command_pa)
             status_word = self._status_word()
             held_pa = self._in_force_pa(set_point_pa, status_word)
             wanted = self._configuration.wanted()
             self._say_alive()
-            self._bus.hear((*own_ids, *self._pdos.tpdo_ids))
-            self._sdo.require_alone()
+            self._bus.hear((*own_ids, *self.pdos.tpdo_ids))
+            self.sdo.require_alone()
             as_found = held_pa == set_point_pa or status_word & LOCAL  # a set point is not taken then
             self._set(wanted, None if as_found else held_pa)
             self._manage(START)
@@ -110,8 +110,8 @@ class CanopenDriver:
         Raises:
             DriverError: none came that can be trusted.
         """
-        self._pdos.catch_up()
-        reading = self._reading(self._pdos.sample())
+        self.pdos.catch_up()
+        reading = self._reading(self.pdos.sample())
         if self._watcher.was_interrupted:
             self._watcher.was_interrupted = False
             return replace(reading, status=reading.status | DeviceStatus.NOT_READY)
@@ -129,14 +129,14 @@ class CanopenDriver:
             DriverError: no measurement came that can be trusted.
         """
         try:
-            self._pdos.prepare(command_pa, self._activation.control)
+            self.pdos.prepare(command_pa, self._activation.control)
         except ValueError as error:
             self._bus.require_open()
             raise self._refused(f"not sent: {error}") from None
-        self._pdos.catch_up()
+        self.pdos.catch_up()
         self._say_alive()
-        self._pdos.send_command()
-        reading = self._reading(self._pdos.sample())
+        self.pdos.send_command()
+        reading = self._reading(self.pdos.sample())
         if self._watcher.refusal is not None:
             raise self._refused(f"{command_pa:g} Pa: {self._watcher.refusal}")
         return reading
@@ -147,9 +147,9 @@ class CanopenDriver:
         Raises:
             DriverError: it did not answer, or is not OPERATIONAL any more.
         """
-        self._pdos.catch_up()
+        self.pdos.catch_up()
         self._watcher.state = None
-        held_pa = self._sdo.held_command_pa(self._config.map.command_pa)
+        held_pa = self.sdo.held_command_pa(self._config.map.command_pa)
         self._watcher.judge_state()
         return held_pa
 
@@ -163,7 +163,7 @@ class CanopenDriver:
     def _status_word(self) -> int:
         """Return the status word; that of an ACTIVE node where it has none."""
         entry = self._config.map.status_word
-        return NodeState.ACTIVE if entry is None else int(self._sdo.get(entry))
+        return NodeState.ACTIVE if entry is None else int(self.sdo.get(entry))
 
     def _in_force_pa(self, set_point_pa: float, status_word: int) -> float:
         """Return the command that holds the valve where it is: the set point, or what the node does in its place.
@@ -174,7 +174,7 @@ class CanopenDriver:
         if inactive_because(status_word) is None:
             return set_point_pa
         shown = self._config.map.pressure_pa
-        shown_pa = math.nan if shown is None else self._sdo.get(shown)
+        shown_pa = math.nan if shown is None else self.sdo.get(shown)
         if not math.isfinite(shown_pa):
             return set_point_pa if status_word & STATE_BITS in HOLDING else 0.0
         if status_word & LOCAL or (self._config.acts_alone_by == "fill" and shown_pa > set_point_pa):
@@ -186,19 +186,19 @@ class CanopenDriver:
 
         With a command, Pa, that one is its set point before.
         """
-        was_operational = bool(wanted) and self._sdo.hears_operational()
-        self._sdo.begin()
+        was_operational = bool(wanted) and self.sdo.hears_operational()
+        self.sdo.begin()
         try:
             if wanted:
                 self._manage(ENTER_PRE_OPERATIONAL)
             for each in wanted:
-                self._sdo.download(*each)
+                self.sdo.download(*each)
             if command_pa is not None:
-                self._sdo.set(self._config.map.command_pa, command_pa)
-            self._activation.activate(self._sdo)
-            self._sdo.require_alone()
+                self.sdo.set(self._config.map.command_pa, command_pa)
+            self._activation.activate(self.sdo)
+            self.sdo.require_alone()
         except BaseException:
-            self._sdo.put_back()
+            self.sdo.put_back()
             if was_operational:
                 with suppress(DriverError):
                     self._manage(START)

@@ -121,7 +121,7 @@ class PdoExchange:
 
     def __init__(self, config: CanopenDevice, sheet: ObjectDictionary, bus: NodeBus, watcher: NodeWatcher) -> None:
         self._sheet, self._bus, self._watcher = sheet, bus, watcher
-        self._reply_timeout_s = config.reply_timeout_s
+        self.reply_timeout_s = config.reply_timeout_s
         sampled, commanded = config.map.sampled, config.map.commanded
         self._variables = {
             name: sheet_variable(sheet, config, name, entry) for name, entry in {**sampled, **commanded}.items()
@@ -263,7 +263,7 @@ class PdoExchange:
         """Wait for the TPDOs of the SYNC just sent."""
         missing = {each: pdo for each, pdo in self._tpdos.items() if each not in self._by_themselves}
         values: dict[str, float] = {}
-        rest_s = self._reply_timeout_s
+        rest_s = self.reply_timeout_s
         end_s = time.monotonic() + rest_s
         while missing:
             message = self._bus.receive(max(0.0, rest_s))
@@ -298,7 +298,7 @@ class PdoExchange:
         return {**self._newest, **own}
 
     def _await_first(self) -> None:
-        end_s = time.monotonic() + max(self._reply_timeout_s, self._first_within_s)
+        end_s = time.monotonic() + max(self.reply_timeout_s, self._first_within_s)
         while len(self._came) < len(self._by_themselves):
             rest_s = end_s - time.monotonic()
             message = self._bus.receive(max(0.0, rest_s))
@@ -323,7 +323,7 @@ class PdoExchange:
         """Return what it means that TPDOs are missing."""
         event = NodeEvent.HEARTBEAT_LOST if self._watcher.is_silent else NodeEvent.SYNC_LOST
         said = (
-            f"{missing} of {len(self._tpdos)} TPDOs missing {1e3 * self._reply_timeout_s:g} ms "
+            f"{missing} of {len(self._tpdos)} TPDOs missing {1e3 * self.reply_timeout_s:g} ms "
             f"{'after SYNC' if self.need_sync else 'after the command'}, "
             f"last heartbeat {1e3 * self._watcher.silence_s:.0f} ms ago"
         )

@@ -95,7 +95,7 @@ class SdoTransfers:
     def __init__(self, config: CanopenDevice, sheet: ObjectDictionary, bus: NodeBus, watcher: NodeWatcher) -> None:
         self._sheet, self._bus, self._watcher = sheet, bus, watcher
         self._eds_name = config.eds.name
-        self._timeout_s = config.reply_timeout_s
+        self.timeout_s = config.reply_timeout_s
         self._request_id, self._answer_id = SDO_REQUEST + bus.node, SDO_ANSWER + bus.node
         self._client = _Client(self, self._request_id, self._answer_id, sheet)
         self._requests = self._answers = 0
@@ -266,7 +266,7 @@ class SdoTransfers:
         """
         self._requests += 1
         self.send(request)
-        end_s = time.monotonic() + self._timeout_s
+        end_s = time.monotonic() + self.timeout_s
         while (rest_s := end_s - time.monotonic()) > 0:
             answer = self._receive(rest_s)
             if answer is None:
@@ -305,7 +305,7 @@ class SdoTransfers:
         """
         multiplexer = struct.pack("<HB", random.choice(RESERVED), random.randrange(256))
         self.send(bytes((UPLOAD_REQUEST,)) + multiplexer + bytes(4))
-        end_s = time.monotonic() + self._timeout_s
+        end_s = time.monotonic() + self.timeout_s
         while (rest_s := end_s - time.monotonic()) > 0:
             answer = self._receive(rest_s)
             if answer is not None and answer[0] == ABORT and answer[1:4] in (multiplexer, UNNAMED):
@@ -314,7 +314,7 @@ class SdoTransfers:
         if state is not None and state not in (OPERATIONAL, PRE_OPERATIONAL):
             said = f"its heartbeat says {NMT_STATES.get(state, str(state))}; it is left so, for another master to start"
             raise self._bus.fault(NoConnection, NodeEvent.NOT_OPERATIONAL, said)
-        raise NoConnection(f"{self._bus.who}: {NodeEvent.NO_NODE} within {1e3 * self._timeout_s:g} ms")
+        raise NoConnection(f"{self._bus.who}: {NodeEvent.NO_NODE} within {1e3 * self.timeout_s:g} ms")
 
     def _identify(self) -> None:
         for part, name in ((VENDOR, "vendor"), (PRODUCT, "product")):
@@ -329,7 +329,7 @@ class SdoTransfers:
         where = f"{index:#06x} sub {subindex}"
         if isinstance(error, SdoAbortedError):
             return Refused(f"{self._bus.who}: {NodeEvent.SDO_ABORT}: {where}: {error}", error.code)
-        said = f"{where}: {error} within {1e3 * self._timeout_s:g} ms"
+        said = f"{where}: {error} within {1e3 * self.timeout_s:g} ms"
         return self._bus.fault(NoReply, NodeEvent.SDO_TIMEOUT, said)
 
 

@@ -47,13 +47,18 @@ ENDING_S = 2.0
 
 
 class RefinementProcess:
-    """The process, and the thread that speaks with it. Made once; `refiner` gives each valve its own side."""
+    """The process, and the thread that speaks with it. Made once; `refiner` gives each valve its own side.
+
+    Attributes:
+        child: the process; None where there is none.
+        again_s: when it may be started again, on the monotonic clock.
+    """
 
     def __init__(self) -> None:
-        self._process: subprocess.Popen[bytes] | None = None
+        self.child: subprocess.Popen[bytes] | None = None
         self._jobs: SimpleQueue[tuple[ProcessRefiner, RefinementJob] | None] = SimpleQueue()
         self._failures = 0
-        self._again_s = -math.inf
+        self.again_s = -math.inf
         self._thread = Thread(target=self._serve, name="refinement", daemon=True)
         self._thread.start()
 
@@ -66,7 +71,7 @@ class RefinementProcess:
         self._jobs.put(None)
         self._thread.join(ENDING_S)
         if self._thread.is_alive():  # it waits for an answer: none will come
-            process = self._process
+            process = self.child
             if process is not None:
                 process.kill()
             self._thread.join(ENDING_S)
@@ -74,7 +79,7 @@ class RefinementProcess:
     @property
     def alive(self) -> bool:
         """Whether it takes jobs: it runs, or is to be started again."""
-        return time.monotonic() >= self._again_s
+        return time.monotonic() >= self.again_s
 
     def put(self, refiner: "ProcessRefiner", job: RefinementJob) -> None:
         """Queue a job."""
@@ -92,7 +97,7 @@ class RefinementProcess:
 
     def _serve(self) -> None:
         """Start the process, and hand it one job after another; start it again where it is gone."""
-        self._process = self._started()
+        self.child = self._started()
         while (task := self._next()) is not None:
             refiner, job = task
             result = None
@@ -109,8 +114,8 @@ class RefinementProcess:
         while True:
             with suppress(Empty):
                 return self._jobs.get(timeout=LOOK_EVERY_S)
-            if self._process is not None and self._process.poll() is not None:
-                self._give_up(f"it ended by itself, {_ended(self._process.returncode)}")
+            if self.child is not None and self.child.poll() is not None:
+                self._give_up(f"it ended by itself, {_ended(self.child.returncode)}")
 
     def _done(self, job: RefinementJob) -> BatchResult | None:
         """Have a job done.
@@ -118,9 +123,9 @@ class RefinementProcess:
         Raises:
             OSError, EOFError, UnpicklingError: the process is gone, or does not answer.
         """
-        if self._process is None:
-            self._process = self._started()
-        down, up = cast(IO[bytes], self._process.stdin), cast(IO[bytes], self._process.stdout)
+        if self.child is None:
+            self.child = self._started()
+        down, up = cast(IO[bytes], self.child.stdin), cast(IO[bytes], self.child.stdout)
         pickle.dump(job, down)
         down.flush()
         if not select.select((up,), (), (), ANSWER_WITHIN_S)[0]:
@@ -132,12 +137,12 @@ class RefinementProcess:
         """End what is left of the process; it is not started again for a while."""
         wait_s = min(FIRST_S * 2.0**self._failures, LONGEST_S)
         self._failures = min(self._failures + 1, MOST_FAILURES)
-        self._again_s = time.monotonic() + wait_s
+        self.again_s = time.monotonic() + wait_s
         log_event(log, logging.ERROR, "the refinement process is gone", reason=reason, again_after_s=wait_s)
         self._close()
 
     def _close(self) -> None:
-        process, self._process = self._process, None
+        process, self.child = self.child, None
         if process is None:
             return
         with suppress(OSError), cast(IO[bytes], process.stdin), cast(IO[bytes], process.stdout):

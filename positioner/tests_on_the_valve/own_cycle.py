@@ -50,7 +50,7 @@ class OwnCycle:
 
     def __init__(self, cycle: Cycle, turn: Callable[[], None] | None = None, kind: Kind = VALVE) -> None:
         self.cycle = cycle
-        self._turn = turn or cycle.once
+        self.turn = turn or cycle.once
         self._rows = Rows(kind)
         cycle.recorder = self._rows
 
@@ -63,7 +63,7 @@ class OwnCycle:
         self._rows.taken()
         until_s = self.cycle.snapshot.sample.now_s + for_s
         while self.cycle.snapshot.sample.now_s < until_s:
-            self._turn()
+            self.turn()
         return self._rows.taken()
 
     def play(self, program: Program) -> Played:
@@ -89,9 +89,9 @@ class OwnCycle:
         return Played(self._rows.taken(), state, "" if state.played else self._why(state))
 
     def _to_its_end(self) -> None:
-        self._turn()
+        self.turn()
         while self.cycle.snapshot.decision.experiment.commands:
-            self._turn()
+            self.turn()
 
     def _break_off(self) -> None:
         """Veto what is played, and go back to the command before; whoever interrupts that, leaves it where it is."""

@@ -54,11 +54,11 @@ def test_a_job_is_done_elsewhere_exactly_as_here(process: RefinementProcess) -> 
 def test_it_is_started_before_there_is_a_job_and_ends_at_once() -> None:
     made = RefinementProcess()
     until = time.monotonic() + 60
-    while made._process is None and time.monotonic() < until:
+    while made.child is None and time.monotonic() < until:
         time.sleep(0.005)
-    assert made._process is not None
-    assert made._process.poll() is None
-    child, begin = made._process, time.monotonic()
+    assert made.child is not None
+    assert made.child.poll() is None
+    child, begin = made.child, time.monotonic()
     made.stop()
     assert child.poll() is not None
     assert time.monotonic() - begin < 2.0
@@ -91,8 +91,8 @@ def test_a_process_that_dies_or_does_not_answer_is_told_and_started_again(
     refiner = process.refiner(blocking=True)
     assert refiner.submit(job())
     assert refiner.collect() is not None
-    assert process._process is not None
-    before = process._process
+    assert process.child is not None
+    before = process.child
     with monkeypatch.context() as impatient:
         impatient.setattr(room, "ANSWER_WITHIN_S", 0.2)
         impatient.setattr(room, "FIRST_S", 1e6)
@@ -101,10 +101,10 @@ def test_a_process_that_dies_or_does_not_answer_is_told_and_started_again(
         assert refiner.collect() is None
         assert not refiner.submit(job()), "not before the back-off is over"
     assert caplog.messages == ["the refinement process is gone"]
-    process._again_s = 0.0
+    process.again_s = 0.0
     assert refiner.submit(job())
     assert refiner.collect() is not None
-    assert process._process is not before
+    assert process.child is not before
     assert before.poll() is not None, "nothing is left of it"
     process.stop()
 
@@ -115,12 +115,12 @@ def test_a_process_that_is_killed_while_idle_is_said_and_none_is_left_of_it(
     monkeypatch.setattr(room, "LOOK_EVERY_S", 0.01)
     process = RefinementProcess()
     until = time.monotonic() + 60
-    while process._process is None and time.monotonic() < until:
+    while process.child is None and time.monotonic() < until:
         time.sleep(0.005)
-    assert process._process is not None
-    child = process._process
+    assert process.child is not None
+    child = process.child
     os.kill(child.pid, signal.SIGKILL)
-    while process._process is not None and time.monotonic() < until:
+    while process.child is not None and time.monotonic() < until:
         time.sleep(0.005)
     assert child.returncode == -signal.SIGKILL, "it was waited for: no zombie"
     assert not Path(f"/proc/{child.pid}").exists()
@@ -135,7 +135,7 @@ def test_it_is_started_ever_more_seldom(monkeypatch: pytest.MonkeyPatch) -> None
     waits = []
     for _ in range(12):
         process._give_up("it ended")
-        waits.append(process._again_s)
+        waits.append(process.again_s)
     assert waits[:4] == [1.0, 2.0, 4.0, 8.0]
     assert waits[-1] == room.LONGEST_S
 

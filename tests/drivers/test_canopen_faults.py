@@ -166,7 +166,7 @@ def test_a_node_that_talks_of_all_else_does_not_keep_the_driver_beyond_its_time_
         monkeypatch.setattr(each, "time", Clock)
     monkeypatch.setattr(driver._bus, "receive", babble)
     start_s = now_s[0]
-    fails(NoReply, NodeEvent.SYNC_LOST, driver._pdos.sample)
+    fails(NoReply, NodeEvent.SYNC_LOST, driver.pdos.sample)
     assert now_s[0] - start_s == pytest.approx(PATIENT_S, abs=2e-3)
 
 
@@ -240,7 +240,7 @@ def test_late_answers_to_what_was_asked_before_are_passed_over(driver: CanopenDr
     node.fault = lambda identity, data: [(ANSWER, STALE)] * 40 * (data[0] == 0x80) + [(identity, data)]
     assert driver.open() == PUSH_PA
     node.fault = lambda identity, data: [(ANSWER, STALE)] if data[0] == 0x80 else [(identity, data)]
-    driver._sdo._timeout_s = 0.1
+    driver.sdo.timeout_s = 0.1
     fails(NoConnection, NodeEvent.NO_NODE, driver.open)
 
 
@@ -278,11 +278,11 @@ def test_what_another_master_is_told_of_the_same_object_does_not_confirm_a_write
         return [(ANSWER, read), (identity, data)] if confirms else [(identity, data)]
 
     node.fault = told_too
-    driver._sdo.set(entry, PUSH_PA)
+    driver.sdo.set(entry, PUSH_PA)
     node.fault = lambda identity, data: [(ANSWER, read)] if data[0] == 0x60 else [(identity, data)]
-    driver._sdo._timeout_s = 0.1
+    driver.sdo.timeout_s = 0.1
     with pytest.raises(NoReply, match="no answer"):
-        driver._sdo.set(entry, PUSH_PA)
+        driver.sdo.set(entry, PUSH_PA)
 
 
 def test_every_request_answered_twice_is_two_nodes(driver: CanopenDriver, node: Scripted) -> None:
@@ -375,10 +375,10 @@ def test_a_node_that_another_master_resets_or_stops(
         node.node.send_message(HEARTBEAT, bytes((4,)))
     fails(NoConnection, event, lambda: driver.exchange(PUSH_PA))
     if command == 2:
-        driver._sdo._timeout_s = 0.05
+        driver.sdo.timeout_s = 0.05
         fails(NoConnection, NodeEvent.NO_NODE, driver.open)
         assert node.node.state == 4, "it is left as the other master wants it"
-        driver._sdo._timeout_s = PATIENT_S
+        driver.sdo.timeout_s = PATIENT_S
         third.send(frame(0, bytes((128, NODE))))
         in_time(lambda: node.node.state == 127)
     driver.open()
@@ -393,9 +393,9 @@ def test_a_node_that_was_stopped_is_one_though_its_tpdo_was_missed_before_its_he
 ) -> None:
     third.send(frame(0, bytes((128, NODE))))
     in_time(lambda: node.node.state == 127)
-    driver._pdos._reply_timeout_s = 0.05
+    driver.pdos.reply_timeout_s = 0.05
     fails(NoReply, NodeEvent.SYNC_LOST, lambda: driver.exchange(PUSH_PA))
-    driver._pdos._reply_timeout_s = PATIENT_S
+    driver.pdos.reply_timeout_s = PATIENT_S
     beat = (HEARTBEAT, bytes((127,)))
     node.fault = lambda identity, data: [(identity, data), beat] if identity == ANSWER else [(identity, data)]
     driver.open()
@@ -406,9 +406,9 @@ def test_a_node_that_was_stopped_is_one_though_its_tpdo_was_missed_before_its_he
 
 def test_a_tpdo_that_is_lost_is_no_stop_of_the_node(driver: CanopenDriver, node: Scripted) -> None:
     node.fault = without(TPDO_1)
-    driver._pdos._reply_timeout_s = 0.05
+    driver.pdos.reply_timeout_s = 0.05
     fails(NoReply, NodeEvent.SYNC_LOST, lambda: driver.exchange(PUSH_PA))
-    driver._pdos._reply_timeout_s = PATIENT_S
+    driver.pdos.reply_timeout_s = PATIENT_S
     node.fault = honest
     driver.open()
     assert driver.read().status == 0

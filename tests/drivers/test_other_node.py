@@ -96,10 +96,10 @@ class OtherNode:
             self.node.sdo[int(name, 16)].raw = value
         for index, value in ((0x2007, 2), (STATUS_WORD, 0b1111), (0x1017, HEARTBEAT_MS), (0x6040, 7)):
             self.node.sdo[index].raw = value
-        self.network.subscribe(0, self._note)
-        self.network.subscribe(0x600 + NODE, self._note)
+        self.network.subscribe(0, self.note)
+        self.network.subscribe(0x600 + NODE, self.note)
 
-    def _note(self, identity: int, data: bytearray, _stamp: float) -> None:
+    def note(self, identity: int, data: bytearray, _stamp: float) -> None:
         self.frames.append((identity, bytes(data)))
 
     def _refuse(self, **write: object) -> None:
@@ -279,7 +279,7 @@ def test_pdos_that_cannot_be_changed_are_used_as_they_are(other: OtherNode) -> N
     fix_pdos(other)
     before = other.configuration
     other.answer_sync({0x1C1: struct.pack("<If", 77, 0.025), 0x2C1: struct.pack("<ff", 7.0, 41e3)})
-    other.network.subscribe(0x341, other._note)
+    other.network.subscribe(0x341, other.note)
     driver = driver_of(other, map=OBJECTS)
     assert driver.open() == HELD_PA
     reading = driver.exchange(33e3)
@@ -341,7 +341,7 @@ def test_pdos_that_come_by_themselves_with_a_timer_are_used_as_they_are(tmp_path
         other.constant = set()
         other.node.sdo[0x1400][2].raw = 255
         other.constant = {index + record for index in (0, 0x200) for record in (*MAPPED, 0x1802, 0x1803)}
-        other.network.subscribe(0x80, other._note)
+        other.network.subscribe(0x80, other.note)
         before = other.configuration
         driver = driver_of(other, map=OBJECTS)
         assert driver.open() == HELD_PA
@@ -374,7 +374,7 @@ def test_a_node_that_shall_watch_its_master_hears_its_heartbeat(tmp_path: Path) 
     try:
         fix_pdos(other)
         other.answer_sync({0x1C1: struct.pack("<If", 77, 0.025), 0x2C1: struct.pack("<ff", 7.0, 41e3)})
-        other.network.subscribe(0x700 + MASTER, other._note)
+        other.network.subscribe(0x700 + MASTER, other.note)
         driver = driver_of(
             other, map=OBJECTS, eds=sheet, master_node=MASTER, master_heartbeat_s=0.05, heartbeats_missed=2.5
         )

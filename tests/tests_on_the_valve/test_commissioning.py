@@ -172,7 +172,7 @@ def test_the_rates_of_a_booster_are_found_where_the_command_is_faster(filling: f
 
 def test_who_interrupts_it_gets_the_command_before_back() -> None:
     valve = VirtualValve(file=UNKNOWN)
-    held_pa, turn, count = valve.command_pa(), valve._turn, 0
+    held_pa, turn, count = valve.command_pa(), valve.turn, 0
 
     def interrupted() -> None:
         nonlocal count
@@ -181,7 +181,7 @@ def test_who_interrupts_it_gets_the_command_before_back() -> None:
             raise KeyboardInterrupt
         turn()
 
-    valve._turn = interrupted
+    valve.turn = interrupted
     with pytest.raises(KeyboardInterrupt):
         commission(valve, "FV-1", BOUNDS)
     assert valve.command_pa() == held_pa

@@ -107,7 +107,7 @@ def run(seed: int) -> None:
     program, band_m = asked_of(valve, drawn)
     held_pa, begun_m = valve.command_pa(), valve.device.stem_m
     farthest_m = 0.0
-    turn: Callable[[], None] = valve._turn
+    turn: Callable[[], None] = valve.turn
     happened = drawn.what in DEVICE
 
     def watched() -> None:
@@ -118,7 +118,7 @@ def run(seed: int) -> None:
         turn()
         farthest_m = max(farthest_m, abs(valve.device.stem_m - begun_m))
 
-    valve._turn = watched
+    valve.turn = watched
     played = valve.play(program)
     speed = (RATE_PA_PER_S if drawn.test in ("fast", "steps", "narrow") else 140e3 / 60.0) / SLOPE
     lied_m = JUMP_M if drawn.what in ("jump", "drift") else 0.0

@@ -124,7 +124,7 @@ def test_a_stem_that_creeps_before_the_test_is_told() -> None:
 
 def test_a_veto_breaks_it_off_and_the_command_before_comes_back() -> None:
     valve = VirtualValve(TIGHT, initial=WIDE_OPEN)
-    held_pa, turn, count = valve.command_pa(), valve._turn, 0
+    held_pa, turn, count = valve.command_pa(), valve.turn, 0
 
     def vetoing() -> None:
         nonlocal count
@@ -134,7 +134,7 @@ def test_a_veto_breaks_it_off_and_the_command_before_comes_back() -> None:
             assert valve.cycle.snapshot.decision.experiment.commands
             vetoed(valve.cycle)
 
-    valve._turn = vetoing
+    valve.turn = vetoing
     played = valve.play(program_for(valve, PartialStroke()))
     outcome = partial_stroke(played, PartialStroke(), "FV-1", STROKE_M)
     assert outcome.verdicts == (V.BROKEN_OFF,)
@@ -148,14 +148,14 @@ def test_the_travel_is_kept_within_band_and_speed(fast: bool) -> None:
     file = daemon_file(experiment={"rate_limit_pa_per_s": 20e3})
     valve = VirtualValve(TIGHT, file, initial=MIDWAY)
     asked = PartialStroke(fast=fast)
-    farthest_m, turn, begun_m = 0.0, valve._turn, valve.device.stem_m
+    farthest_m, turn, begun_m = 0.0, valve.turn, valve.device.stem_m
 
     def watched() -> None:
         nonlocal farthest_m
         turn()
         farthest_m = max(farthest_m, abs(valve.device.stem_m - begun_m))
 
-    valve._turn = watched
+    valve.turn = watched
     outcome = outcome_of(valve, asked)
     assert outcome.verdicts == (V.PASSED,)
     speed = (20e3 if fast else 140e3 / 60.0) / SLOPE
