@@ -67,8 +67,8 @@ def _places(tree: ast.AST) -> Iterator[tuple[ast.AST, ast.AST]]:
     """Yield what is changed, and the node that holds it, which is shown."""
     for parent in ast.walk(tree):
         for node in ast.iter_child_nodes(parent):
-            is_number = isinstance(node, ast.Constant) and isinstance(node.value, int | float)
-            if is_number and not isinstance(node.value, bool) and not isinstance(parent, ast.Subscript | ast.Slice):
+            is_number = isinstance(node, ast.Constant) and type(node.value) in (int, float)
+            if is_number and not isinstance(parent, ast.Subscript | ast.Slice):
                 yield parent if hasattr(parent, "lineno") else node, node
         if isinstance(parent, ast.Compare) and type(parent.ops[0]) in OTHERS:
             yield parent, parent.ops[0]
