@@ -103,6 +103,20 @@ def test_up_and_down_follow_the_law_and_delta_r_is_kept() -> None:
         assert down.command_pa == pytest.approx(800e3 * 0.04 - 20e3)
 
 
+@pytest.mark.parametrize(("before_m", "direction"), [(0.04, 1), (0.06, -1)])
+def test_a_sine_whose_alpha_nobody_says_swings_about_the_balance_of_the_law(before_m: float, direction: int) -> None:
+    bench = automatic()
+    for reference_m in (before_m, 0.05):
+        bench.ask(reference_m=reference_m)
+        bench.step()
+    bench.ask(eta=(0, 0, 0), alpha_pa=0.0, omega_rad_per_s=100.0)
+    swings = [bench.step() for _ in range(63)]
+    assert {each.state for each in swings} == {State.S3_IDENTIFY}
+    ends_pa = [end(each.command_pa for each in swings) for end in (min, max)]
+    about_pa = 800e3 * 0.05 + direction * 20e3
+    assert ends_pa == pytest.approx([about_pa - BETA_PA, about_pa + BETA_PA], abs=0.02 * BETA_PA)
+
+
 def test_a_reference_written_before_automatic_is_followed_once_it_is() -> None:
     bench = Bench()
     bench.ask(reference_m=0.05)
