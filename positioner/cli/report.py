@@ -42,8 +42,7 @@ def run(arguments: argparse.Namespace) -> int:
     kept = records(folder)
     if not any(each.kind for each in kept):
         raise CommandFailed(f"nothing is kept in {folder}: a test with --keep as_found or as_left keeps it")
-    recommended = recommended_by(file) | _recommended(arguments.recommended, kept)
-    report = ValveReport(file.valve.name, kept, recommended)
+    report = ValveReport(file.valve.name, kept, _recommended(arguments.recommended, kept), recommended_by(file))
     if arguments.out.suffix.lower() == ".pdf":
         try:
             write_pdf(report, arguments.out)

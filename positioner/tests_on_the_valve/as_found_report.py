@@ -7,11 +7,12 @@
     pictures                        as found and as left, drawn into one
     signed                          who tested, who accepted
 
-What is recommended is what the daemon's file says, or who asks for the report. A PDF needs matplotlib.
+What is recommended is what who asks for the report says, else the factory's record, else the daemon's file. A PDF needs
+matplotlib.
 """
 
 from collections.abc import Iterator, Mapping, Sequence
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from datetime import UTC, datetime
 from html import escape
 from typing import TYPE_CHECKING, Any
@@ -20,7 +21,7 @@ import numpy as np
 
 from config.daemon_file import DaemonFile
 from config.results.block import Table, as_text
-from positioner.tests_on_the_valve.kept_records import KINDS, Record, change_table, changes
+from positioner.tests_on_the_valve.kept_records import KINDS, MEANS, Change, Record, change_table, changes
 from positioner.tests_on_the_valve.outcome import Curve, Picture, Quantity
 from positioner.tests_on_the_valve.thresholds import THRESHOLDS
 
@@ -58,12 +59,13 @@ class ValveReport:
         valve: its name.
         records: all that are kept, oldest first.
         recommended: what figures should be, by name, SI.
-        configuration: of the newest record, tables by name.
+        by_file: what the daemon's file makes of them, where there is no record of the factory's.
     """
 
     valve: str
     records: Sequence[Record]
     recommended: Mapping[str, float] = field(default_factory=dict)
+    by_file: Mapping[str, float] = field(default_factory=dict)
 
     @property
     def configuration(self) -> Mapping[str, Any]:
@@ -96,35 +98,41 @@ class ValveReport:
         verdicts = ("verdict", "", *(record.outcome.said for record in kept.values()))
         return Table(("figure", "recommended ", *(f"{TITLES[kind]} " for kind in kept)), [verdicts, *rows], test)
 
-    def changed(self, test: str) -> list[Table]:
-        """Return what changed from as found to as left, and to as left since the factory."""
+    def compared(self, test: str) -> Iterator[tuple[Record, Record, list[Change]]]:
+        """Yield a test's records before and after: since the factory, and from as found to as left."""
         kept = self.kept(test)
-        told = []
-        for before, after in (("as_found", "as_left"), ("factory", "as_left"), ("factory", "as_found")):
-            if before in kept and after in kept and (after == "as_left" or "as_left" not in kept):
-                table = change_table(changes(kept[after].outcome, kept[before].outcome), kept[before].told)
-                if table.rows:
-                    told.append(table)
-        return told
+        for before, after in (("factory", "as_found"), ("factory", "as_left"), ("as_found", "as_left")):
+            if before in kept and after in kept:
+                yield kept[before], kept[after], changes(kept[after].outcome, kept[before].outcome)
+
+    def changed(self, test: str) -> list[Table]:
+        """Return what has changed from each record to the next."""
+        tables = [change_table(each, f"{before.told}, {after.told}") for before, after, each in self.compared(test)]
+        return [each for each in tables if each.rows]
 
     def findings(self) -> list[str]:
         """Return what the figures mean that have changed since the factory or, without one, until as left, in words."""
-        told = []
-        for test in self.tests():
-            kept = self.kept(test)
-            for before, after in (("factory", "as_found"), ("factory", "as_left"), ("as_found", "as_left")):
-                if before not in kept or after not in kept or (before == "as_found" and "factory" in kept):
-                    continue
-                told += [
-                    f"{test}, {TITLES[after]}: {each.means} ({each.quantity.text} {each.quantity.shown}, "
-                    f"{TITLES[before]} {each.before.shown})"
-                    for each in changes(kept[after].outcome, kept[before].outcome)
-                    if each.changed and each.means
-                ]
-        return told
+        return [
+            f"{test}, {TITLES[after.kind]}: {each.means} ({each.quantity.text} {each.quantity.shown}, "
+            f"{TITLES[before.kind]} {each.before.shown})"
+            for test in self.tests()
+            for before, after, changed in self.compared(test)
+            if before.kind == "factory" or "factory" not in self.kept(test)
+            for each in changed
+            if each.changed and each.means
+        ]
 
     def _value(self, quantity: Quantity) -> float | None:
-        return self.recommended.get(quantity.name, quantity.expected)
+        told = self.by_file | self._factory | self.recommended
+        return told.get(quantity.name, quantity.expected)
+
+    @property
+    def _factory(self) -> dict[str, float]:
+        """What the factory's newest records say of what a technician looks at, by name."""
+        left = [each.outcome for each in self.records if each.kind == "factory"]
+        told = {each.name: each.figure.value for outcome in left for each in outcome.quantities}
+        looked_at = MEANS.keys() | self.by_file.keys()
+        return {name: value for name, value in told.items() if name in looked_at and value is not None}
 
     def _shown(self, quantity: Quantity | None) -> str:
         """Return a figure as it is shown, marked where it is off what is recommended."""
@@ -138,10 +146,7 @@ class ValveReport:
         return f"{quantity.shown} *" if marked else quantity.shown
 
     def _recommended(self, quantity: Quantity) -> str:
-        value = self._value(quantity)
-        if value is None:
-            return ""
-        return Quantity(quantity.name, "", quantity.unit, quantity.figure, value).shown_expected
+        return replace(quantity, expected=self._value(quantity)).shown_expected
 
 
 def recommended_by(file: DaemonFile) -> dict[str, float]:
@@ -167,7 +172,7 @@ def as_html(report: ValveReport) -> str:
         f" or half a bracket; what cannot be determined says why; {MARK}</p>",
         _findings(report),
         *(_section(report, each) for each in report.tests()),
-        f"<section><h2>Configuration</h2>{_configuration(report)}</section>",
+        f"<section><h2>Configuration</h2><pre>{escape(_lines(report.configuration))}</pre></section>",
         "<section><h2>Signed</h2><dl>" + "".join(f"<div><dt>{each}</dt></div>" for each in SIGNED) + "</dl></section>",
     ]
     if not report.tests():
@@ -246,10 +251,6 @@ def _html_table(table: Table) -> str:
     head = "".join(f"<th>{escape(each.strip())}</th>" for each in table.headings)
     rows = "".join("<tr>" + "".join(f"<td>{escape(cell)}</td>" for cell in row) + "</tr>" for row in table.rows)
     return f"<table><thead><tr>{head}</tr></thead><tbody>{rows}</tbody></table>"
-
-
-def _configuration(report: ValveReport) -> str:
-    return f"<pre>{escape(_lines(report.configuration))}</pre>"
 
 
 def _lines(configuration: Mapping[str, Any]) -> str:

@@ -16,7 +16,7 @@ A reading that falls as the command rises is that of a valve which air closes, f
 
 from collections.abc import Callable
 from dataclasses import dataclass, replace
-from math import ceil, degrees, floor, hypot, isfinite, log10, sqrt
+from math import ceil, degrees, hypot, isfinite, sqrt
 from typing import Protocol
 
 import numpy as np
@@ -28,8 +28,8 @@ from config.travel import ActionWord
 from positioner.response.figure import Figure, undetermined
 from positioner.tests_on_the_valve import signature, small_steps
 from positioner.tests_on_the_valve.air_rates import air_rates
-from positioner.tests_on_the_valve.outcome import Outcome, Quantity
-from positioner.tests_on_the_valve.program import Bounds, Leap, Played, Player, Program, ramped
+from positioner.tests_on_the_valve.outcome import Outcome, Quantity, digits
+from positioner.tests_on_the_valve.program import Bounds, Leap, Player, Program, ramped
 from positioner.tests_on_the_valve.thresholds import THRESHOLDS
 from signals.noise import quantum_m
 
@@ -127,7 +127,10 @@ def _commissioned(valve: Watching, name: str, bounds: Bounds, show: Callable[[st
     up_s, down_s = _stroke_times(strokes, sign, ends, noise_m)
     filling, venting = air_rates(strokes, bounds.rate_pa_per_s)
     half_pa = 0.5 * sum(each.value or 0.0 for each in bench)
-    leak = _leak(_played(valve, _held(bounds, start_pa, half_pa), show), sign)
+    held = (Leap(half_pa, THRESHOLDS.leak_s), Leap(start_pa, 0.5))
+    held_still = _played(valve, ramped("leak", start_pa, held, bounds.rate_pa_per_s), show)
+    digit_m = max(digit_m, quantum_m(recordings[0].position_m))
+    leak = _leak(held_still, sign, digit_m)
     steps = _steps(valve, bounds, start_pa, half_pa, friction, (travel.value, sign, name), show)
     kind = recordings[0].kind
     action: ActionWord = "air_to_open" if sign > 0 else "air_to_close"
@@ -180,10 +183,7 @@ def _watched(recording: Recording | None) -> tuple[float, float, float]:
 
 def _played(valve: Watching, program: Program, show: Callable[[str], None]) -> Recording:
     show(f"{program.name}, {program.lasts_s:.0f} s")
-    return _recording_of(valve.play(program))
-
-
-def _recording_of(played: Played) -> Recording:
+    played = valve.play(program)
     if not played.state.played or played.recording is None:
         raise _Ended(
             ValveTestVerdict.BROKEN_OFF, f"{played.problem or 'nothing was recorded'}; the command before is held"
@@ -259,11 +259,7 @@ def _stroke_times(
     return up, down
 
 
-def _held(bounds: Bounds, start_pa: float, half_pa: float) -> Program:
-    return ramped("leak", start_pa, (Leap(half_pa, THRESHOLDS.leak_s), Leap(start_pa, 0.5)), bounds.rate_pa_per_s)
-
-
-def _leak(recording: Recording, sign: float) -> Figure:
+def _leak(recording: Recording, sign: float, digit_m: float) -> Figure:
     """Return how fast the stem creeps while the command is held, m/s."""
     p, t = recording.command_pa, recording.time_s
     held = np.flatnonzero(np.abs(np.diff(p, prepend=p[0])) < 1e-9 * max(1.0, float(np.max(np.abs(p)))))
@@ -275,7 +271,8 @@ def _leak(recording: Recording, sign: float) -> Figure:
     at_s, x = t[rows] - t[rows[0]], sign * recording.position_m[rows]
     slope, level = np.polyfit(at_s, x, 1)
     left_m = float(np.std(x - slope * at_s - level, ddof=2))
-    return Figure(float(slope), 2.0 * left_m / (float(np.std(at_s)) * sqrt(len(x))))
+    unseen_m_per_s = digit_m / float(at_s[-1])
+    return Figure(float(slope), max(THRESHOLDS.sigmas * left_m / (float(np.std(at_s)) * sqrt(len(x))), unseen_m_per_s))
 
 
 def _steps(
@@ -293,8 +290,7 @@ def _steps(
     program = small_steps.programme(replace(asked, most=0.9), bounds, half_pa, travel_m)
     way_s = abs(half_pa - start_pa) / bounds.rate_pa_per_s
     shifted = tuple((way_s + 1e-3 + time_s, pressure_pa) for time_s, pressure_pa in program.points)
-    back_s = abs(half_pa - start_pa) / bounds.rate_pa_per_s
-    points = ((0.0, start_pa), *shifted, (shifted[-1][0] + back_s + 1e-3, start_pa))
+    points = ((0.0, start_pa), *shifted, (shifted[-1][0] + way_s + 1e-3, start_pa))
     recording = _played(valve, Program("small steps", points), show)
     return small_steps.small_steps(_mirrored(recording, sign), name, travel_m)
 
@@ -358,5 +354,4 @@ def _rounded(value: float | None, plus_minus: float | None) -> float:
     assert value is not None
     if not plus_minus:
         return float(f"{value:.6g}")
-    digit = 10.0 ** (floor(log10(plus_minus)) - 1)
-    return float(f"{round(value / digit) * digit:.6g}")
+    return round(value, digits(plus_minus))

@@ -12,45 +12,37 @@ spring rate. At 0.05 % of the command's range a second neither lag nor viscous f
 from collections.abc import Sequence
 from dataclasses import dataclass
 
-from config.codes import ExperimentState, ValveTestVerdict
+from config.codes import ValveTestVerdict
 from config.drive import VALVE, Kind
 from config.errors import InputError
 from positioner.response.figure import Figure, undetermined
 from positioner.tests_on_the_valve.breakout import Breakout, breakout, rest_before, tolerance_m
 from positioner.tests_on_the_valve.outcome import Curve, Outcome, Picture, Quantity
-from positioner.tests_on_the_valve.program import Bounds, Leap, Played, Program, ramped
+from positioner.tests_on_the_valve.program import Bounds, Leap, Played, Program, ramped, require_within
 from positioner.tests_on_the_valve.thresholds import THRESHOLDS
 
 TEST = "continuous stroke test"
-RATE = 5e-4
-"""Of the command's range, per second."""
-MOST = 0.02
-"""Of the stroke: farther it may not move the stem of a valve in operation."""
-START = 0.003
-"""Of the stroke: motion that ends it."""
 
 
 @dataclass(frozen=True, slots=True)
 class ContinuousStroke:
-    """What is asked for: shares of the stroke; of the command's range, per second."""
+    """What is asked for: the motion that ends it, and the most that a valve in operation may move, of the stroke; the
+    rate, of the command's range, 1/s.
+    """
 
-    start: float = START
-    most: float = MOST
-    rate: float = RATE
+    start: float = 0.003
+    most: float = 0.02
+    rate: float = 5e-4
 
     def require_possible(self) -> None:
-        """Refuse what cannot be.
-
-        Raises:
-            InputError: names the option, the value and what is allowed.
-        """
-        for option, value, low, high in (
-            ("--start", self.start, 1e-4, 0.5 * self.most),
-            ("--most", self.most, 0.002, 0.2),
-            ("--rate", self.rate, 1e-5, 0.05),
-        ):
-            if not low <= value <= high:
-                raise InputError(option, f"allowed is {low:g} to {high:g}, got {value:g}")
+        """Refuse what cannot be; InputError as `require_within`."""
+        require_within(
+            (
+                ("--start", self.start, 1e-4, 0.5 * self.most),
+                ("--most", self.most, 0.002, 0.2),
+                ("--rate", self.rate, 1e-5, 0.05),
+            ),
+        )
 
 
 def programme(
@@ -108,10 +100,8 @@ def continuous_stroke(
         rests.append(rest.position_m)
         found.append(breakout(each.recording, rest, tolerance))
     for each in played:
-        if not each.state.played:
-            beyond = each.state in (ExperimentState.BEYOND_BAND, ExperimentState.OUTSIDE_WINDOW)
-            verdicts.append(ValveTestVerdict.TRAVEL_EXCEEDED if beyond else ValveTestVerdict.BROKEN_OFF)
-            notes.append(f"broken off: {each.problem}")
+        verdicts += each.broken_off
+        notes += [f"broken off: {each.problem}"] if each.broken_off else []
     up, down = [*found, None, None][:2]
     still = [way for way, each in (("up", up), ("down", down)) if each is None]
     if still and not verdicts:

@@ -11,7 +11,7 @@ of which the partial stroke shows, a share C_f of all the proof test, and the re
 
 from dataclasses import dataclass
 
-from config.errors import InputError
+from positioner.tests_on_the_valve.program import require_within
 
 HOURS_A_YEAR = 8766.0
 SMALL = 0.1
@@ -36,20 +36,16 @@ class Credit:
     life_y: float
 
     def require_possible(self) -> None:
-        """Refuse what cannot be.
-
-        Raises:
-            InputError: names the option.
-        """
-        for option, value, low, high in (
-            ("--failure-rate-per-h", self.rate_per_h, 1e-12, 1e-3),
-            ("--partial-coverage", self.partial_share, 0.0, self.proof_share),
-            ("--proof-coverage", self.proof_share, 0.0, 1.0),
-            ("--every-days", self.partial_y, 0.0, self.proof_y),
-            ("--proof-every-years", self.proof_y, 0.0, self.life_y),
-        ):
-            if not low <= value <= high:
-                raise InputError(option, f"allowed is {low:g} to {high:g}, got {value:g}")
+        """Refuse what cannot be; InputError as `require_within`."""
+        require_within(
+            (
+                ("--failure-rate-per-h", self.rate_per_h, 1e-12, 1e-3),
+                ("--partial-coverage", self.partial_share, 0.0, self.proof_share),
+                ("--proof-coverage", self.proof_share, 0.0, 1.0),
+                ("--every-days", self.partial_y, 0.0, self.proof_y),
+                ("--proof-every-years", self.proof_y, 0.0, self.life_y),
+            ),
+        )
 
     def pfd_avg(self, *, tested: bool) -> float:
         """Return the mean probability of failure on demand, with or without the partial stroke test.

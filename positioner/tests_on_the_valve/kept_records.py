@@ -39,6 +39,8 @@ RATE = "rate_pa_per_s"
 """The figure that says how fast the slowest ramp was."""
 AT_ITS_RATE = frozenset({"friction_at_rate_pa", "lag_pa", "dynamic_error_band", "dynamic_error_band_mean"})
 """Figures that hold for a ramp of their own rate: compared with those of such a one alone."""
+OF_ITS_START = frozenset({"command_pa", "start_m", "breakout_pa", "breakout_s", "back_m"})
+"""Figures of where a test began, and of which way the stem had come there: compared with none."""
 MEANS: Mapping[str, tuple[str, str]] = {
     "friction_pa": (
         "friction lower: packing loose or worn, it may leak",
@@ -61,7 +63,6 @@ MEANS: Mapping[str, tuple[str, str]] = {
     "lag_pa": ("less lag: another tubing or booster", "more lag: tubing or booster choked, air leaks"),
     "opening_s": ("opens faster", "opens more slowly: supply, tubing, booster or friction"),
     "closing_s": ("closes faster", "closes more slowly: exhaust, booster, spring or friction"),
-    "breakout_pa": ("breaks loose more easily", "breaks loose harder: packing, or the plug sticks in its seat"),
 }
 """Of a figure that fell, and that rose: what a technician looks at first."""
 
@@ -162,7 +163,7 @@ def baseline(folder: Path, test: str, against: str | None) -> Record | None:
 def changes(now: Outcome, before: Outcome) -> list[Change]:
     """Return the figures of both, how far each is off; one without a +- can be compared with nothing."""
     then = {each.name: each for each in before.quantities}
-    apart = AT_ITS_RATE if _rates_differ(now, before) else frozenset()
+    apart = OF_ITS_START | (AT_ITS_RATE if _rates_differ(now, before) else frozenset())
     both = [(each, then[each.name]) for each in now.quantities if each.name in then.keys() - apart]
     told = [pair for pair in both if all(each.figure.value is None or each.figure.plus_minus for each in pair)]
     return [Change(each, was, _deviations(each.figure, was.figure)) for each, was in told]

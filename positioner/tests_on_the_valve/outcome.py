@@ -2,7 +2,7 @@
 
 from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass, field, replace
-from math import degrees, radians
+from math import degrees, floor, log10, radians
 from typing import TYPE_CHECKING, Self
 
 from config.codes import ValveTestVerdict
@@ -35,6 +35,15 @@ SHOWN = {
 """Units as they are printed, of those that SI has inside; others are printed as they are."""
 
 
+def digits(plus_minus: float) -> int:
+    """Return the decimal places that a +- leaves of its figure: two digits of it.
+
+    >>> digits(0.045), digits(47.0), digits(3200.0)
+    (3, 0, -2)
+    """
+    return 1 - floor(log10(plus_minus))
+
+
 @dataclass(frozen=True, slots=True)
 class Quantity:
     """A figure of a test: what it is called, its SI unit, its value; `expected` is what it should be, where known."""
@@ -60,9 +69,12 @@ class Quantity:
         if self.figure.value is None:
             return f"cannot be determined: {self.figure.reason}"
         scale, unit = SHOWN.get(self.unit, (1.0, self.unit))
-        value = f"{scale * self.figure.value:.5g}"
-        error = "" if self.figure.plus_minus is None else f" ± {scale * self.figure.plus_minus:.2g}"
-        return f"{value}{error} {unit}"
+        value, error = scale * self.figure.value, scale * (self.figure.plus_minus or 0.0)
+        if error == 0.0:
+            return f"{value:.5g} {unit}"
+        places = digits(error)
+        value, error = round(value, places), round(error, places)
+        return f"{value:.{max(0, places)}f} ± {error:.{max(0, places)}f} {unit}"
 
     @property
     def shown_expected(self) -> str:

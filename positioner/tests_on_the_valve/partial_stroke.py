@@ -35,7 +35,7 @@ from positioner.tests_on_the_valve.breakout import (
     tolerance_m,
 )
 from positioner.tests_on_the_valve.outcome import Curve, Outcome, Picture, Quantity
-from positioner.tests_on_the_valve.program import SHORTEST_S, Bounds, Leap, Played, Program, ramped
+from positioner.tests_on_the_valve.program import SHORTEST_S, Bounds, Leap, Played, Program, ramped, require_within
 from positioner.tests_on_the_valve.thresholds import THRESHOLDS
 
 TEST = "partial stroke test"
@@ -64,19 +64,16 @@ class PartialStroke:
     threshold_pa: float | None = None
 
     def require_possible(self) -> None:
-        """Refuse what cannot be.
-
-        Raises:
-            InputError: names the option, the value and what is allowed.
-        """
-        for option, value, low, high in (
-            ("--travel", self.travel, 0.01, 0.5),
-            ("--beyond", self.beyond, 0.005, 0.5),
-            ("--least", self.least, 0.0, self.travel),
-            ("--start", self.start, 1e-4, 0.5 * self.travel),
-        ):
-            if not low <= value <= high:
-                raise InputError(option, f"allowed is {low:g} to {high:g} of the stroke, got {value:g}")
+        """Refuse what cannot be; InputError as `require_within`."""
+        require_within(
+            (
+                ("--travel", self.travel, 0.01, 0.5),
+                ("--beyond", self.beyond, 0.005, 0.5),
+                ("--least", self.least, 0.0, self.travel),
+                ("--start", self.start, 1e-4, 0.5 * self.travel),
+            ),
+            " of the stroke",
+        )
 
 
 def programme(
@@ -138,7 +135,7 @@ def partial_stroke(
     """
     recording = played.recording
     rest = None if recording is None else rest_before(recording)
-    broken_off = [] if played.state.played else [_abort(played.state)]
+    broken_off = played.broken_off
     if recording is None or rest is None:
         verdict = broken_off or [ValveTestVerdict.UNDETERMINED]
         why = played.problem or "too few samples of the rest before it"
@@ -169,11 +166,6 @@ def partial_stroke(
         tuple(notes),
         picture=_picture(recording),
     ).of(recording.kind)
-
-
-def _abort(state: ExperimentState) -> ValveTestVerdict:
-    beyond = state in (ExperimentState.BEYOND_BAND, ExperimentState.OUTSIDE_WINDOW)
-    return ValveTestVerdict.TRAVEL_EXCEEDED if beyond else ValveTestVerdict.BROKEN_OFF
 
 
 def _verdicts(

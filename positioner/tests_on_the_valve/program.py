@@ -4,11 +4,12 @@ A program is a played experiment (`positioner.control.played_experiment`), which
 the way back: no test has a way of its own to move the valve.
 """
 
-from collections.abc import Sequence
+from collections.abc import Iterable, Sequence
 from dataclasses import dataclass
 from typing import Protocol
 
-from config.codes import ExperimentState
+from config.codes import ExperimentState, ValveTestVerdict
+from config.errors import InputError
 from config.recording import Recording
 from positioner.control.played_experiment import ExperimentLimits
 
@@ -18,6 +19,21 @@ SHORTEST_S = 1e-3
 """Between two points, which must follow each other."""
 FLOAT32 = 2.0**-23
 """Times go as float32: each is off by as much of itself, so that a short leap late in a program would be too fast."""
+
+
+Range = tuple[str, float, float, float]
+"""An option, its value, and the least and the most that it may be."""
+
+
+def require_within(ranges: Iterable[Range], of: str = "") -> None:
+    """Refuse what cannot be.
+
+    Raises:
+        InputError: names the first option beyond its range, the value and what is allowed.
+    """
+    for option, value, low, high in ranges:
+        if not low <= value <= high:
+            raise InputError(option, f"allowed is {low:g} to {high:g}{of}, got {value:g}")
 
 
 @dataclass(frozen=True, slots=True)
@@ -55,6 +71,14 @@ class Played:
     recording: Recording | None
     state: ExperimentState
     problem: str = ""
+
+    @property
+    def broken_off(self) -> list[ValveTestVerdict]:
+        """By what it was broken off; nothing where it came to its end."""
+        if self.state.played:
+            return []
+        beyond = self.state in (ExperimentState.BEYOND_BAND, ExperimentState.OUTSIDE_WINDOW)
+        return [ValveTestVerdict.TRAVEL_EXCEEDED if beyond else ValveTestVerdict.BROKEN_OFF]
 
 
 class Player(Protocol):

@@ -27,6 +27,7 @@ from numpy.typing import NDArray
 from config.recording import Column, Recording
 from positioner.response.figure import Figure, undetermined
 from positioner.tests_on_the_valve.thresholds import THRESHOLDS
+from signals.noise import quantum_m
 
 
 @dataclass(frozen=True, slots=True)
@@ -152,6 +153,11 @@ def difference(one: Figure, other: Figure, share: float = 1.0) -> Figure:
     return Figure(share * (one.value - other.value), abs(share) * hypot(one.plus_minus or 0.0, other.plus_minus or 0.0))
 
 
+def scaled(figure: Figure, by: float) -> Figure:
+    """Return a figure times a number, or why there is none."""
+    return difference(figure, Figure(0.0, 0.0), by)
+
+
 def mean(one: Figure, other: Figure) -> Figure:
     """Return the mean of two, or why there is none."""
     if one.value is None or other.value is None:
@@ -191,10 +197,11 @@ def ramps_of(legs: Sequence[Leg]) -> Ramps:
         lows.append(low)
         highs.append(high)
         scatter.append(line.residual_m)
+    digit_m = quantum_m(np.concatenate([leg.position_m for leg in legs])) if legs else 0.0
     return Ramps(
         tuple(lines),
-        _end(lows, "the lower"),
-        _end(highs, "the upper"),
+        _end(lows, "the lower", digit_m),
+        _end(highs, "the upper", digit_m),
         float(np.median(scatter)) if scatter else 0.0,
     )
 
@@ -307,7 +314,7 @@ def _at_ends(line: Line, near: tuple[float, float] | None = None) -> tuple[End, 
     return found[0], found[1]
 
 
-def _end(seen: Sequence[End], which: str) -> Figure:
+def _end(seen: Sequence[End], which: str, digit_m: float) -> Figure:
     told = [(level, scatter, count) for level, scatter, count in seen if level is not None]
     if not told:
         return undetermined(f"the stem was not seen to lie at {which} end of its travel")
@@ -316,4 +323,5 @@ def _end(seen: Sequence[End], which: str) -> Figure:
     middle = float(np.sum(counts * levels) / np.sum(counts))
     own = sqrt(sum(count * scatter**2 for _, scatter, count in told)) / float(np.sum(counts))
     spread = float(np.std(levels, ddof=1)) / sqrt(len(levels)) if len(levels) > 1 else 0.0
-    return Figure(middle, THRESHOLDS.sigmas * max(own, spread))
+    # A stem at rest shows one digit, wherever in it that is.
+    return Figure(middle, THRESHOLDS.sigmas * max(own, spread, digit_m / sqrt(12.0)))

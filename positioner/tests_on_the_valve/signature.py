@@ -34,7 +34,7 @@ from config.results.block import Table
 from positioner.response.figure import Figure, undetermined
 from positioner.tests_on_the_valve.outcome import Curve, Outcome, Picture, Quantity
 from positioner.tests_on_the_valve.program import Bounds, Leap, Program, ramped
-from positioner.tests_on_the_valve.ramps import Leg, Line, Ramps, difference, legs_of, mean, ramps_of
+from positioner.tests_on_the_valve.ramps import Leg, Line, Ramps, difference, legs_of, mean, ramps_of, scaled
 from positioner.tests_on_the_valve.thresholds import THRESHOLDS
 
 LEGS = 4
@@ -104,8 +104,11 @@ def signature(recordings: "list[Recording]", plate: Nameplate) -> Outcome:
     notes.append(f"{len(ramps.lines)} ramps at {rates} kPa/s")
     verdict, told = _verdict(ramps, travel, 0.5 * (x_0 + x_1), plate)
     quantities = [
-        *_ends(ramps, travel),
-        *_spring(ramps, plate),
+        Quantity("low_m", "lower end of the travel", "m", low),
+        Quantity("high_m", "upper end of the travel", "m", high),
+        Quantity("travel_m", "travel", "m", travel),
+        Quantity("spring_pa_per_m", "spring rate over 10 to 90 %", "Pa/m", ramps.slope_pa_per_m()),
+        *_force("spring_n_per_m", "spring rate", "N/m", ramps.slope_pa_per_m(), plate),
         *_friction(ramps, plate, x_0, x_1),
         *_bench_set(ramps, plate, x_0, x_1, float(min(np.min(each.command_pa) for each in legs))),
         *_bands(ramps, x_0, x_1),
@@ -152,8 +155,8 @@ def _verdict(
 ) -> tuple[tuple[ValveTestVerdict, ...], list[str]]:
     if travel.value is None:
         return (ValveTestVerdict.UNDETERMINED,), ["the ramps did not take the stem from end to end"]
-    apart, slope = difference(ramps.at_slowest(1, half_m), ramps.at_slowest(-1, half_m)), ramps.slope_pa_per_m()
-    if (slope.value or 0.0) * travel.value < THRESHOLDS.springless * (apart.value or 0.0):
+    _, slow, _ = _half_apart(ramps, half_m)
+    if (ramps.slope_pa_per_m().value or 0.0) * travel.value < THRESHOLDS.springless * 2.0 * (slow.value or 0.0):
         return (ValveTestVerdict.NO_SPRING,), [f"a broken spring, or {NEEDED['double_acting']}"]
     off_m = abs(travel.value - plate.stroke_m)
     if off_m > max(THRESHOLDS.stroke_wrong * plate.stroke_m, travel.plus_minus or 0.0):
@@ -165,40 +168,22 @@ def _verdict(
     return (ValveTestVerdict.PASSED,), []
 
 
-def _ends(ramps: Ramps, travel: Figure) -> list[Quantity]:
-    return [
-        Quantity("low_m", "lower end of the travel", "m", ramps.low_m),
-        Quantity("high_m", "upper end of the travel", "m", ramps.high_m),
-        Quantity("travel_m", "travel", "m", travel),
-    ]
-
-
-def _spring(ramps: Ramps, plate: Nameplate) -> list[Quantity]:
-    slope = ramps.slope_pa_per_m()
-    return [
-        Quantity("spring_pa_per_m", "spring rate over 10 to 90 %", "Pa/m", slope),
-        *_force("spring_n_per_m", "spring rate", "N/m", slope, plate),
-    ]
-
-
 def _force(name: str, text: str, unit: str, figure: Figure, plate: Nameplate) -> list[Quantity]:
     """Return the same as a force, where the area is known."""
     if plate.area_m2 is None:
         return []
-    return [Quantity(name, text, unit, _scaled(figure, plate.area_m2))]
+    return [Quantity(name, text, unit, scaled(figure, plate.area_m2))]
 
 
-def _scaled(figure: Figure, by: float) -> Figure:
-    if figure.value is None:
-        return figure
-    return Figure(by * figure.value, None if figure.plus_minus is None else abs(by) * figure.plus_minus)
+def _half_apart(ramps: Ramps, half_m: float) -> tuple[Figure, Figure, Figure]:
+    """Return half the distance of both directions at half travel, at no rate and at the slowest, and what that adds."""
+    still = difference(ramps.at_no_rate(1, half_m), ramps.at_no_rate(-1, half_m), 0.5)
+    slow = difference(ramps.at_slowest(1, half_m), ramps.at_slowest(-1, half_m), 0.5)
+    return still, slow, difference(slow, still)
 
 
 def _friction(ramps: Ramps, plate: Nameplate, x_0: float, x_1: float) -> list[Quantity]:
-    half = 0.5 * (x_0 + x_1)
-    still = difference(ramps.at_no_rate(1, half), ramps.at_no_rate(-1, half), 0.5)
-    slow = difference(ramps.at_slowest(1, half), ramps.at_slowest(-1, half), 0.5)
-    lag = difference(slow, still)
+    still, slow, lag = _half_apart(ramps, 0.5 * (x_0 + x_1))
     return [
         Quantity("friction_pa", "friction at half travel, taken to no rate", "Pa", still),
         *_force("friction_n", "friction", "N", still, plate),
@@ -245,10 +230,8 @@ def _together(up: Figure, down: Figure) -> Figure:
 
 
 def _bands(ramps: Ramps, x_0: float, x_1: float) -> list[Quantity]:
-    half = 0.5 * (x_0 + x_1)
-    apart = difference(ramps.at_no_rate(1, half), ramps.at_no_rate(-1, half))
-    slope = ramps.slope_pa_per_m().value or 1.0
-    hysteresis = _scaled(apart, 1.0 / (slope * (x_1 - x_0)))
+    still, _, _ = _half_apart(ramps, 0.5 * (x_0 + x_1))
+    hysteresis = scaled(still, 2.0 / ((ramps.slope_pa_per_m().value or 1.0) * (x_1 - x_0)))
     centres, up, down, error = _averaged(ramps, x_0, x_1)
     few = undetermined("too few samples of both directions at one command")
     largest, average, linear = few, few, few
@@ -309,15 +292,12 @@ def _in_bins(lines: list[Line], edges: Column) -> tuple[Column, Column]:
 
 def _over_travel(ramps: Ramps, plate: Nameplate, x_0: float, x_1: float) -> Table:
     """Return friction at the tenths of the travel."""
-    half = 0.5 * (x_0 + x_1)
-    still = difference(ramps.at_no_rate(1, half), ramps.at_no_rate(-1, half), 0.5)
-    slow = difference(ramps.at_slowest(1, half), ramps.at_slowest(-1, half), 0.5)
-    lag_pa = 0.0 if still.value is None or slow.value is None else slow.value - still.value
+    lag_pa = _half_apart(ramps, 0.5 * (x_0 + x_1))[2].value or 0.0
     rows, unit = [], plate.kind.force.si
     for share in DECILES:
         found = _friction_at(ramps, x_0 + share * (x_1 - x_0), 0.1 * (x_1 - x_0), lag_pa)
         shown = Quantity("", "", "Pa", found).shown
-        force = "" if plate.area_m2 is None else Quantity("", "", unit, _scaled(found, plate.area_m2)).shown
+        force = "" if plate.area_m2 is None else Quantity("", "", unit, scaled(found, plate.area_m2)).shown
         rows.append((f"{100 * share:.0f} %", shown, *((force,) if plate.area_m2 is not None else ())))
     headings = ("travel", "friction, as a pressure", *(("friction",) if plate.area_m2 is not None else ()))
     return Table(headings, rows, "friction over travel, at the slowest rate less its lag")

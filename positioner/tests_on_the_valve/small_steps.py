@@ -9,7 +9,7 @@ Each step is held, so that the stem rests when the next comes. What did not move
 (`positioner.response.dead_band`); step responses (T63, T86) are those of the steps that did.
 """
 
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 from statistics import median
 
 from config.codes import ValveTestVerdict
@@ -19,7 +19,8 @@ from positioner.response.dead_band import responded
 from positioner.response.figure import Figure, undetermined
 from positioner.response.response_figures import respond
 from positioner.tests_on_the_valve.outcome import Curve, Outcome, Picture, Quantity
-from positioner.tests_on_the_valve.program import Bounds, Leap, Program, ramped
+from positioner.tests_on_the_valve.program import Bounds, Leap, Program, ramped, require_within
+from positioner.tests_on_the_valve.ramps import scaled
 from positioner.tests_on_the_valve.thresholds import THRESHOLDS
 
 TEST = "step test"
@@ -34,18 +35,14 @@ class SmallSteps:
     most: float = 0.3
 
     def require_possible(self) -> None:
-        """Refuse what cannot be.
-
-        Raises:
-            InputError: names the option, the value and what is allowed.
-        """
-        for option, value, low, high in (
-            ("--dead-band-pa", self.dead_band_pa, 1.0, 1e6),
-            ("--held-s", self.held_s, 0.05, 600.0),
-            ("--most", self.most, 0.01, 0.9),
-        ):
-            if not low <= value <= high:
-                raise InputError(option, f"allowed is {low:g} to {high:g}, got {value:g}")
+        """Refuse what cannot be; InputError as `require_within`."""
+        require_within(
+            (
+                ("--dead-band-pa", self.dead_band_pa, 1.0, 1e6),
+                ("--held-s", self.held_s, 0.05, 600.0),
+                ("--most", self.most, 0.01, 0.9),
+            ),
+        )
 
 
 def programme(
@@ -127,17 +124,7 @@ def _of_span(dead_band: Figure, resolution: Figure, slope: float | None, stroke_
         return []
     span_pa = slope * stroke_m
     pairs = (("dead_band", "dead band, of the span", dead_band), ("resolution", "resolution, of the span", resolution))
-    return [
-        Quantity(
-            name,
-            text,
-            "1",
-            each
-            if each.value is None
-            else replace(each, value=each.value / span_pa, plus_minus=(each.plus_minus or 0.0) / span_pa),
-        )
-        for name, text, each in pairs
-    ]
+    return [Quantity(name, text, "1", scaled(each, 1.0 / span_pa)) for name, text, each in pairs]
 
 
 def _time(name: str, text: str, told: list[Figure]) -> Quantity:

@@ -56,9 +56,8 @@ class Thresholds:
     """Deviations of the noise beyond which a leg has moved the stem."""
 
     rate_ratio: float = 3.0
-    """Of the fast rate to the slow one: taken to no rate, the slow ramp's error grows by 3/2 only. A stem that breaks
-    loose at a third more than it slides at still sticks at this rate; at four times the slow one it slides all the way,
-    and the friction at no rate is 1.5 % high."""
+    """Of the fast rate to the slow one: taken to no rate, the slow ramp's error grows by 3/2. At four times, a stem
+    that sticks by a third slides all the way, and its friction comes out 1.5 % high."""
     end_held_s: float = 1.0
     """At each end of a ramp, for the stem to come to rest."""
     slowest_leg_s: float = 60.0

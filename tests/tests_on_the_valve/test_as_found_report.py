@@ -87,7 +87,7 @@ def test_every_column_that_tables_of_plants_have_is_there_with_its_plus_minus(si
     assert rows["seat load"][1] == "1200 N"
     friction = rows["friction at half travel, taken to no rate"]
     assert [cell.endswith("*") for cell in friction[1:4]] == [False, True, False], "6 kPa: twice of it was found"
-    assert rows["opens within"][-1] == "1.1 ± 0.05 s"
+    assert rows["opens within"][-1] == "1.100 ± 0.050 s"
     assert rows["closes within"][-1].startswith("cannot be determined: longer than")
     assert rows["bench set, upper end"][1] == "80 kPa"
     assert any("packing loose or worn" in cell for row in page.rows for cell in row)
@@ -136,6 +136,15 @@ def test_a_report_of_what_was_found_alone_has_one_column(tmp_path: Path) -> None
     assert report.table("commissioning").headings == ("figure", "recommended ", "as found ")
     assert report.changed("commissioning") == []
     assert "as found and as left" in as_html(report)
+
+
+def test_the_factorys_record_is_recommended_before_what_the_file_was_commissioned_to(tmp_path: Path) -> None:
+    """A file that was written as the valve was found must not mark the mended one."""
+    keep(tmp_path, STROKES, "factory", 1e9, {})
+    keep(tmp_path, STROKES, "as_left", 2e9, {})
+    report = ValveReport("FV-1", records(tmp_path), by_file={"opening_s": 3.0})
+    (opens,) = (row for row in report.table("commissioning").rows if row[0] == "opens within")
+    assert opens[1:] == ("1.1 s", "1.100 ± 0.050 s", "1.100 ± 0.050 s")
 
 
 def test_what_the_file_says_is_recommended() -> None:

@@ -11,8 +11,9 @@ from config.codes import ExperimentState, ValveTestVerdict
 from config.errors import InputError
 from config.slave_file import Change, DeviceFault, Initial
 from positioner.control.settings import Settings
+from positioner.response.figure import Figure
 from positioner.tests_on_the_valve.credit import Credit
-from positioner.tests_on_the_valve.kept_records import keep, records, trend
+from positioner.tests_on_the_valve.kept_records import changes, keep, records, trend
 from positioner.tests_on_the_valve.outcome import Outcome
 from positioner.tests_on_the_valve.partial_stroke import TEST, PartialStroke, partial_stroke, programme
 from positioner.tests_on_the_valve.program import Played, Program
@@ -191,6 +192,17 @@ def test_records_make_a_trend(reference: Outcome, tmp_path: Path) -> None:
     assert [row[-1] for row in shown.rows] == ["passed", "broken off"]
     assert shown.rows[1][1:3] == ("-", "-")
     json.dumps([list(row) for row in shown.rows])
+
+
+def test_where_it_began_is_no_change(reference: Outcome) -> None:
+    """How far it is to break-out is told by which way the stem had come, not by the packing."""
+    quantities = tuple(
+        replace(each, figure=Figure(0.1 * (each.figure.value or 0.0), each.figure.plus_minus))
+        for each in reference.quantities
+    )
+    told = {each.quantity.name for each in changes(replace(reference, quantities=quantities), reference)}
+    assert "friction_at_rate_pa" in told
+    assert not told & {"breakout_pa", "breakout_s", "back_m", "start_m", "command_pa"}
 
 
 def test_the_credit_by_hand() -> None:

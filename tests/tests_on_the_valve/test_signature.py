@@ -219,3 +219,15 @@ def test_a_plant_of_other_equations_has_its_own_parameters_found(bits: int | Non
         ("seat_load_n", other.PRELOAD_N - friction_n, 0.02),
     ):
         assert outcome.figure(name).value == pytest.approx(true, rel=allowed), name
+
+
+def test_an_end_is_known_no_better_than_to_a_digit_of_the_reading() -> None:
+    digit_m = STROKE_M / 4096
+    fine = recorded(ORDINARY, noise=0.0)
+    coarse = [
+        Recording(dict(each.columns) | {"position_m": digit_m * np.round(each.position_m / digit_m)}, each.metadata)
+        for each in fine
+    ]
+    exact, told = (signature(each, PLATE).figure("travel_m") for each in (fine, coarse))
+    assert abs((told.value or 0.0) - (exact.value or 0.0)) <= digit_m
+    assert told.plus_minus == pytest.approx(2.0 * digit_m * (2.0 / 12.0) ** 0.5), "both ends, two deviations each"
