@@ -7,8 +7,7 @@
     pictures                        as found and as left, drawn into one
     signed                          who tested, who accepted
 
-What is recommended is what who asks for the report says, else the factory's record, else the daemon's file. A PDF needs
-matplotlib.
+What is recommended: by who asks for it, else the factory's record, else the daemon's file. A PDF needs matplotlib.
 """
 
 from collections.abc import Iterator, Mapping, Sequence

@@ -12,24 +12,26 @@ from math import sqrt
 
 import numpy as np
 
-from config.recording import Column, Recording
+from config.recording import Recording
 from positioner.response.figure import Figure, undetermined
 from positioner.tests_on_the_valve.thresholds import THRESHOLDS
+from signals.noise import quantum_m
 
 
 @dataclass(frozen=True, slots=True)
 class Rest:
-    """Where the stem rests, m, its scatter and how far it creeps over the rest, m; rows before the command goes off."""
+    """Where the stem rests, its scatter, how far it creeps over the rest, the reading's digit, m; rows of the rest."""
 
     position_m: float
     noise_m: float
     creep_m: float
+    digit_m: float
     rows: int
 
     @property
     def error_m(self) -> float:
-        """Two standard deviations of the mean, m."""
-        return 2.0 * self.noise_m / sqrt(self.rows)
+        """Two standard deviations of the mean, m; a digit that does not flicker is not averaged out."""
+        return 2.0 * max(self.noise_m / sqrt(self.rows), self.digit_m / sqrt(12.0))
 
 
 @dataclass(frozen=True, slots=True)
@@ -47,7 +49,7 @@ def rest_before(recording: Recording) -> Rest | None:
     """Return the rest under the first command; None where there are too few samples of it."""
     command = recording.command_pa
     off = np.flatnonzero(np.abs(command - command[0]) > THRESHOLDS.command_changed * max(1.0, abs(float(command[0]))))
-    return _rest(recording.time_s, recording.position_m, 0, int(off[0]) if off.size else len(command))
+    return _rest(recording, 0, int(off[0]) if off.size else len(command))
 
 
 def rest_after(recording: Recording) -> Rest | None:
@@ -57,7 +59,7 @@ def rest_after(recording: Recording) -> Rest | None:
     off = np.flatnonzero(np.abs(command - command[-1]) > THRESHOLDS.command_changed * max(1.0, abs(float(command[-1]))))
     first = int(off[-1]) + 1 if off.size else 0
     # What is left of the slide back is no rest: its first half is left out.
-    return _rest(recording.time_s, recording.position_m, first + (last - first) // 2, last)
+    return _rest(recording, first + (last - first) // 2, last)
 
 
 def tolerance_m(asked_m: float, rest: Rest) -> float:
@@ -91,10 +93,12 @@ def farthest(recording: Recording, rest: Rest) -> Figure:
     return Figure(float(np.max(gone)), 2.0 * 1.25 * rest.noise_m / sqrt(THRESHOLDS.counted))
 
 
-def _rest(time_s: Column, position_m: Column, first: int, last: int) -> Rest | None:
-    x, t = position_m[first:last], time_s[first:last]
+def _rest(recording: Recording, first: int, last: int) -> Rest | None:
+    x, t = recording.position_m[first:last], recording.time_s[first:last]
     if len(x) < THRESHOLDS.fewest_at_rest:
         return None
     slope, level = np.polyfit(t - t[0], x, 1)
-    noise = float(np.std(x - (slope * (t - t[0]) + level), ddof=2))
-    return Rest(float(np.mean(x)), noise, float(slope) * float(t[-1] - t[0]), last - first)
+    scatter = float(np.std(x - (slope * (t - t[0]) + level), ddof=2))
+    digit_m = quantum_m(recording.position_m)
+    noise = max(scatter, digit_m / sqrt(12.0))
+    return Rest(float(np.mean(x)), noise, float(slope) * float(t[-1] - t[0]), digit_m, last - first)

@@ -26,9 +26,7 @@ TEST = "continuous stroke test"
 
 @dataclass(frozen=True, slots=True)
 class ContinuousStroke:
-    """What is asked for: the motion that ends it, and the most that a valve in operation may move, of the stroke; the
-    rate, of the command's range, 1/s.
-    """
+    """What is asked for: the motion that ends it and the most, of the stroke; the rate, of the command's range, 1/s."""
 
     start: float = 0.003
     most: float = 0.02
