@@ -122,7 +122,7 @@ class ValveReport:
         ]
 
     def _value(self, quantity: Quantity) -> float | None:
-        told = self.by_file | self._factory | self.recommended
+        told = {**self.by_file, **self._factory, **self.recommended}
         return told.get(quantity.name, quantity.expected)
 
     @property
