@@ -122,7 +122,7 @@ class Link:
         self._keeps_settings = driver if isinstance(driver, KeepsSettings) else None
         self._pace = pace
         self._settings = settings or LinkSettings()
-        self._door = door or Semaphore()
+        self._door = door
         self._longest_unattended_s = self._settings.longest_unattended_s
         self._read_back_s = -math.inf
         self._read_backs = 0
@@ -199,11 +199,12 @@ class Link:
                 else:
                     self._sample = self._fresh(reading, command_pa, told_pa)
                     self._told_pa = command_pa
-            elif (self._unattended_s > 0 or self._backoff.may_try(now_s)) and self._door.acquire(blocking=False):
+            elif (self._unattended_s > 0 or self._backoff.may_try(now_s)) and self._enters():
                 try:
                     self._sample = self._found_again()
                 finally:
-                    self._door.release()
+                    if self._door is not None:
+                        self._door.release()
             else:
                 self._sample = self._lost()
         except DriverError as error:
@@ -240,6 +241,10 @@ class Link:
     def release(self) -> None:
         """Close the connection."""
         self._driver.close()
+
+    def _enters(self) -> bool:
+        """Return whether the door lets it connect now."""
+        return self._door is None or self._door.acquire(blocking=False)
 
     def _notice_a_stall(self, now_s: float, command_pa: float) -> None:
         """Have a device that was left alone looked at before it is commanded; say so where this daemon stood still."""
