@@ -138,6 +138,30 @@ class KeepsSettings(Protocol):
 
 
 @runtime_checkable
+class AsksAhead(Protocol):
+    """What a driver is, too, whose exchange need not be waited for: one thread asks many, takes answers later."""
+
+    @property
+    def reply_timeout_s(self) -> float:
+        """How long an answer may take."""
+        ...
+
+    def ask(self, command_pa: float) -> int | None:
+        """Begin an exchange; return the descriptor that is ready to be read when something comes back.
+
+        None: nothing was sent, and `exchange` is to be called. Raises `DriverError`.
+        """
+        ...
+
+    def answer(self, *, late: bool) -> Reading | None:
+        """Return what `exchange` would; None while it has not come whole. Waits for nothing; raises `DriverError`.
+
+        `late` says that the time for it is over.
+        """
+        ...
+
+
+@runtime_checkable
 class ForeseesRefusal(Protocol):
     """What a watching driver is, too, that knows what driving would be refused."""
 

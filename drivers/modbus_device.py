@@ -199,9 +199,11 @@ class ModbusDriver(ABC):
             )
 
     def _write_and_read(self, command_pa: float) -> Reading:
-        read, command = self._reads[0], self._command
-        request = self._exchange_head + self._data(command, command_pa)
+        read, request = self._reads[0], self._exchange_request(command_pa)
         return self._reading(read.values(self._ask(request, read.head_after, read.length)))
+
+    def _exchange_request(self, command_pa: float) -> bytes:
+        return self._exchange_head + self._data(self._command, command_pa)
 
     def _tell(self, setting: "_Setting", value: float) -> None:
         data = self._data(setting, value)

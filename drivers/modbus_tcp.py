@@ -11,10 +11,11 @@ from contextlib import suppress
 from itertools import cycle
 
 from config.device import ModbusTcpDevice
-from drivers.boundary import BadReply, DoubleReply, DriverError, NoConnection, NoReply, Refused
+from drivers.boundary import BadReply, DoubleReply, DriverError, NoConnection, NoReply, Reading, Refused
 from drivers.modbus_device import READ_COUNTS, ModbusDriver
 from fieldbus.modbus.client import ModbusClient
 from fieldbus.modbus.client_errors import (
+    ClientError,
     DuplicatedReply,
     NotConnected,
     OtherTransaction,
@@ -40,6 +41,7 @@ class ModbusTcpDriver(ModbusDriver):
     def __init__(self, config: ModbusTcpDevice) -> None:
         super().__init__(config, f"{config.host}:{config.port} unit {config.unit}")
         self._framing = config.framing
+        self._asked = b""
         self._client = ModbusClient(
             config.host, config.port, config.unit, config.reply_timeout_s, config.tls, _framing(config)
         )
@@ -75,17 +77,48 @@ class ModbusTcpDriver(ModbusDriver):
     def _transact(self, request: bytes, head: bytes, length: int) -> bytes:
         try:
             reply = self._client.transact(request)
-        except NotConnected as error:
-            raise NoConnection(f"{self._about(request)}: {error}") from None
-        except ReplyTimeout as error:
-            raise NoReply(f"{self._about(request)}: {error}{self._cure_of_silence(request)}") from None
-        except DuplicatedReply as error:
-            raise DoubleReply(f"{self._about(request)}: {error}") from None
-        except UnexpectedReply as error:
-            raise BadReply(f"{self._about(request)}: {error}{_cure(error)}") from None
+        except ClientError as error:
+            raise self._meaning(request, error) from None
         if len(reply) == length and reply.startswith(head):
             return reply
         raise self._fault(request, reply)
+
+    @property
+    def reply_timeout_s(self) -> float:
+        """How long a reply may take."""
+        return self._config.reply_timeout_s
+
+    def ask(self, command_pa: float) -> int | None:
+        """Command a pressure; return what is ready to be read when something comes back. None: `exchange` does it."""
+        if not self._one_transaction or self._config.pause_s:
+            return None
+        self._asked = self._exchange_request(command_pa)
+        return self._client.ask(self._asked)
+
+    def answer(self, *, late: bool) -> Reading | None:
+        """Return the measurement; None while the reply is not whole."""
+        request, read = self._asked, self._reads[0]
+        try:
+            reply = self._client.answer(late=late)
+        except ClientError as error:
+            raise self._meaning(request, error) from None
+        if reply is None:
+            return None
+        if len(reply) != read.length or not reply.startswith(read.head_after):
+            raise self._fault(request, reply)
+        return self._reading(read.values(reply[len(read.head_after) :]))
+
+    def _meaning(self, request: bytes, error: ClientError) -> DriverError:
+        match error:
+            case NotConnected():
+                return NoConnection(f"{self._about(request)}: {error}")
+            case ReplyTimeout():
+                return NoReply(f"{self._about(request)}: {error}{self._cure_of_silence(request)}")
+            case DuplicatedReply():
+                return DoubleReply(f"{self._about(request)}: {error}")
+            case UnexpectedReply():
+                return BadReply(f"{self._about(request)}: {error}{_cure(error)}")
+        raise error
 
     def _for_nothing_answered(self) -> str:
         return '; frames of a serial line: device.framing = "rtu"' if self._framing == "mbap" else ""

@@ -19,7 +19,7 @@ from pymodbus.pdu.register_message import (
 )
 
 from config.tls_table import Tls
-from fieldbus.modbus.client_errors import NobodyThere, NotConnected, Refused, ReplyTimeout, UnexpectedReply
+from fieldbus.modbus.client_errors import ClientError, NobodyThere, NotConnected, Refused, ReplyTimeout, UnexpectedReply
 from fieldbus.modbus.exception_codes import exception_code
 from fieldbus.modbus.framing import Framing, MbapFraming
 from fieldbus.modbus.host_address import HostAddress, connected
@@ -105,15 +105,57 @@ class ModbusClient:
         try:
             line.sendall(self._framing.request(pdu))
             return self._reply(line)
-        except TimeoutError:
+        except (OSError, UnexpectedReply) as error:
+            raise self._ended_by(error) from None
+
+    def ask(self, pdu: bytes) -> int | None:
+        """Send a request whose reply `answer` takes; return the descriptor that is ready to be read when some is there.
+
+        None: nothing was sent, and `transact` says why. A secured connection is ready without a reply, too.
+        """
+        line = self._socket
+        if line is None or self._context is not None:
+            return None
+        try:
+            line.sendall(self._framing.request(pdu))
+        except OSError:
             self.close()
-            raise ReplyTimeout(f"no reply within {1e3 * self._timeout_s:g} ms") from None
-        except OSError as error:
-            self.close()
-            raise NotConnected(failure_reason(error) if isinstance(error, ssl.SSLError) else CLOSED) from None
-        except UnexpectedReply:
-            self.close()
-            raise
+            return None
+        return line.fileno()
+
+    def answer(self, *, late: bool) -> bytes | None:
+        """Return the PDU that answers what was asked; None while it is not whole. Waits for nothing.
+
+        Args:
+            late: whether the time-out is over.
+
+        Raises:
+            ClientError: as `transact`.
+        """
+        line = self._socket
+        if line is None:
+            raise NotConnected(CLOSED)
+        try:
+            if late:
+                raise TimeoutError
+            self._received += _some(line)
+            found = self._framing.reply(self._received)
+        except (OSError, UnexpectedReply) as error:
+            raise self._ended_by(error) from None
+        if found is None:
+            return None
+        used, pdu = found
+        self._received = self._received[used:]
+        return pdu
+
+    def _ended_by(self, error: OSError | UnexpectedReply) -> ClientError:
+        """End the connection and return what to raise."""
+        self.close()
+        if isinstance(error, UnexpectedReply):
+            return error
+        if isinstance(error, TimeoutError):
+            return ReplyTimeout(f"no reply within {1e3 * self._timeout_s:g} ms")
+        return NotConnected(failure_reason(error) if isinstance(error, ssl.SSLError) else CLOSED)
 
     def read_holding_registers(self, address: int, count: int) -> list[int]:
         """Return `count` words (function 3).

@@ -7,6 +7,7 @@ own. They meet only in immutable snapshots that are replaced whole: the cycle wa
     assembled_valves              its valves from their files, or some of them, with all that runs for them
     workers                       processes that share them, where one processor is too little
     cycle, pacing, link           one cycle, when it begins, and the driver with its connection
+    cycles_together               one thread that cycles many valves, where none is waited for
     cycle_load                    what the cycles of all valves cost, and how many fit
     first_look                    whether a device's numbers can be what the file takes them for
     backoff                       when to try again what failed, and what to say of it

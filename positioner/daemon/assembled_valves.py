@@ -28,6 +28,7 @@ from positioner.control.travel.signal_path import SignalPath
 from positioner.daemon.alarms.alarm_list import AlarmList
 from positioner.daemon.backoff import AT_A_TIME
 from positioner.daemon.cycle import Cycle, run_in_turn
+from positioner.daemon.cycles_together import SLOT_S, CyclesTogether
 from positioner.daemon.ending import Endings
 from positioner.daemon.first_look import impossible
 from positioner.daemon.health import Health, HealthKeeper, HealthSettings, StoredHealth, ne107_condition
@@ -94,6 +95,7 @@ class ServedValve:
     link: Link
     controller: Controller
     cycle: Cycle
+    pace: Pace
     recorder: Recorder | None
     keepers: tuple[HealthKeeper | MemoryKeeper, ...]
     """Of its health, and of what is known of it."""
@@ -160,6 +162,13 @@ class AssembledValves:
         ]
         self._lines = [[self._valves[each] for each in line] for line in share.lines]
         self._stop = Event()
+        ahead = [
+            (valve.cycle, valve.pace)
+            for (valve, *others) in self._lines
+            if not others and isinstance(valve.pace, RealTimePace) and valve.link.reply_timeout_s is not None
+        ]
+        self._together = CyclesTogether(ahead, self._stop) if len(ahead) > 1 else None
+        asked = {cycle for cycle, _ in ahead} if self._together else set()
         self._threads = [
             Thread(
                 target=run_in_turn,
@@ -167,7 +176,10 @@ class AssembledValves:
                 name=f"cycle of {together[0].name}",
             )
             for together in self._lines
+            if together[0].cycle not in asked
         ]
+        if self._together is not None:
+            self._threads.append(Thread(target=self._together.run, name=f"cycles of {len(ahead)} valves"))
         self.registers: Mapping[int, Registers] = {
             valve.file.supervisory.unit: valve.served(counts) for valve in self._valves
         }
@@ -187,7 +199,7 @@ class AssembledValves:
         keeping = Keeping([Kept(keeper, valve.name) for valve in self._valves for keeper in valve.keepers])
         keeping.start()
         self._on_exit.callback(keeping.stop)
-        prepare_process(len(self._lines))
+        prepare_process(len(self._threads))
         for thread in self._threads:
             thread.start()
         raise_above_cycles()
@@ -204,6 +216,8 @@ class AssembledValves:
     def end(self, _endings: Endings) -> None:
         """Cycle no more, and give each device its last command; lines at the same time, for a silent one takes long."""
         self._stop.set()
+        if self._together is not None:
+            self._together.wake()
         for thread in self._threads:
             if thread.ident is not None:
                 thread.join()
@@ -271,7 +285,7 @@ def _assembled(
     if memory is not None:
         keepers.append(_memory_keeper(memory, file.valve.name, controller, cycle))
     return ServedValve(
-        file, settings, link, controller, cycle, recorder, tuple(keepers), unreachable_reason, locked, alarms
+        file, settings, link, controller, cycle, pace, recorder, tuple(keepers), unreachable_reason, locked, alarms
     )
 
 
@@ -310,10 +324,18 @@ def _paces(files: Sequence[DaemonFile], *, is_alone: bool) -> list[Pace]:
         DevicePace()
         if file.cycle.pace == "device"
         else RealTimePace(
-            file.cycle.period_s, file.cycle.period_s * lines[:index].count(line) / lines.count(line), may_spin=False
+            file.cycle.period_s,
+            _phase_s(file.cycle.period_s, lines[:index].count(line), lines.count(line), together=line is None),
+            may_spin=False,
         )
         for index, (file, line) in enumerate(zip(files, lines, strict=True))
     ]
+
+
+def _phase_s(period_s: float, number: int, valves: int, *, together: bool) -> float:
+    """Return when in its period one of so many valves begins; those that one thread asks, together in slots."""
+    slots = max(1, int(period_s / SLOT_S)) if together else valves
+    return period_s * int(number * slots / valves) / slots
 
 
 def _look(cycle: Cycle, health: Health) -> HealthLook:

@@ -56,7 +56,8 @@ class Cycle:
         self._controller = controller
         self._pace = pace
         self._valve = valve
-        self.snapshot = self._decide()
+        sent_pa = controller.command_pa
+        self.snapshot = self._decided(sent_pa, link.exchange(sent_pa))
 
     def prepare(self) -> None:
         """Make the calling thread, which takes the turns, as punctual as can be."""
@@ -73,14 +74,37 @@ class Cycle:
             self.once()
             self.statistics.enter(started_s, time.monotonic() - started_s, missed)
 
+    def whole(self) -> None:
+        """Run one cycle, now."""
+        with logging_valve(self._valve):
+            self.once()
+
+    def ask(self) -> int | None:
+        """Begin a cycle by asking the device; return what is ready when it answers. None: `whole` does it all."""
+        return self.link.ask(self._controller.command_pa)
+
+    def answer(self, *, late: bool) -> bool:
+        """End a cycle that has asked, if the answer has come, or the time for it is over; return whether it has."""
+        with logging_valve(self._valve):
+            sent_pa = self._controller.command_pa
+            sample = self.link.answer(late=late)
+            if sample is not None:
+                self._conclude(sent_pa, sample)
+        return sample is not None
+
     def since_s(self, snapshot: Snapshot) -> float:
         """Return how long ago a snapshot was made. Called by any thread."""
         return self._pace.since_s(snapshot.sample.now_s)
 
     def once(self) -> None:
         """Run one cycle."""
+        sent_pa = self._controller.command_pa
+        self._conclude(sent_pa, self.link.exchange(sent_pa))
+
+    def _conclude(self, sent_pa: float, sample: Sample) -> None:
+        """Decide on what came back, and say what has changed."""
         before = self.snapshot.decision
-        self.snapshot = self._decide()
+        self.snapshot = self._decided(sent_pa, sample)
         decision = self.snapshot.decision
         if decision is before:
             return
@@ -89,9 +113,7 @@ class Cycle:
         if self.history is not None:
             self.history.enter(before, decision)
 
-    def _decide(self) -> Snapshot:
-        sent_pa = self._controller.command_pa
-        sample = self.link.exchange(sent_pa)
+    def _decided(self, sent_pa: float, sample: Sample) -> Snapshot:
         decision = self._controller.step(sample, self.requests)
         if self.recorder is not None and sample.quality is GOOD:
             # A device that was only looked at has got nothing.

@@ -25,7 +25,17 @@ from config.codes import GOOD, LOST, NO_NUMBER, REPEATED
 from config.daemon_file import DaemonFile
 from config.quantities import ActionName, DeviceStatus
 from config.travel import Travel
-from drivers.boundary import Driver, DriverError, KeepsSettings, NoNumber, NoReply, Reading, ReadsBack, Refused
+from drivers.boundary import (
+    AsksAhead,
+    Driver,
+    DriverError,
+    KeepsSettings,
+    NoNumber,
+    NoReply,
+    Reading,
+    ReadsBack,
+    Refused,
+)
 from positioner.control.sample import Sample, sample_of
 from positioner.daemon.backoff import Backoff, Sayings
 from positioner.daemon.logs import log_event
@@ -120,6 +130,9 @@ class Link:
         # Asking what a driver can do takes a tenth of a cycle.
         self._reads_back = driver if isinstance(driver, ReadsBack) else None
         self._keeps_settings = driver if isinstance(driver, KeepsSettings) else None
+        self._ahead = driver if isinstance(driver, AsksAhead) else None
+        self._asked_pa = 0.0
+        self._before_pa: float | None = None
         self._pace = pace
         self._settings = settings or LinkSettings()
         self._door = door
@@ -189,16 +202,7 @@ class Link:
                 self._commanded_s = now_s
                 told_pa, self._told_pa = self._told_pa, None
                 reading = self._driver.read() if self._settings.shadow else self._driver.exchange(command_pa)
-                self._backoff.succeeded()
-                self._refusals = 0
-                if self._began_anew(reading):
-                    self._say(logging.WARNING, "device began anew", device_time_s=reading.device_time_s)
-                    self._driver.close()
-                    self._connected, self._was_away = False, True
-                    self._sample = self._lost()
-                else:
-                    self._sample = self._fresh(reading, command_pa, told_pa)
-                    self._told_pa = command_pa
+                self._take(reading, command_pa, told_pa)
             elif (self._unattended_s > 0 or self._backoff.may_try(now_s)) and self._enters():
                 try:
                     self._sample = self._found_again()
@@ -211,6 +215,60 @@ class Link:
             self._lose(error)
         self._returned_s = awake_s()
         return self._sample
+
+    @property
+    def is_connected(self) -> bool:
+        """Whether the next exchange goes over the connection that is there."""
+        return self._connected
+
+    @property
+    def reply_timeout_s(self) -> float | None:
+        """How long an answer may take that need not be waited for; None: this device is one that keeps its thread."""
+        driver = self._ahead
+        may = driver is not None and not self._settings.shadow and self._driver.capabilities.one_transaction
+        return driver.reply_timeout_s if driver is not None and may else None
+
+    def ask(self, command_pa: float) -> int | None:
+        """Begin an exchange where nothing is to be done before; return what is ready when something comes back.
+
+        None: `exchange` is to be called.
+        """
+        driver, now_s = self._ahead, awake_s()
+        late = now_s - self._commanded_s > self._longest_unattended_s
+        if driver is None or not self._connected or late or self._reads_back_now:
+            return None
+        self._asked_s = self._commanded_s = now_s
+        self._asked_pa, self._before_pa, self._told_pa = command_pa, self._told_pa, None
+        try:
+            return driver.ask(command_pa)
+        except DriverError:
+            return None
+
+    def answer(self, *, late: bool) -> Sample | None:
+        """Return the sample that comes back of what was asked, or what is known without it; None: not yet."""
+        assert self._ahead is not None
+        try:
+            reading = self._ahead.answer(late=late)
+            if reading is None:
+                return None
+            self._take(reading, self._asked_pa, self._before_pa)
+        except DriverError as error:
+            self._lose(error)
+        self._returned_s = awake_s()
+        return self._sample
+
+    def _take(self, reading: Reading, command_pa: float, told_pa: float | None) -> None:
+        """Make a sample of the answer to a command; the one before it was `told_pa`, if the device has answered it."""
+        self._backoff.succeeded()
+        self._refusals = 0
+        if self._began_anew(reading):
+            self._say(logging.WARNING, "device began anew", device_time_s=reading.device_time_s)
+            self._driver.close()
+            self._connected, self._was_away = False, True
+            self._sample = self._lost()
+        else:
+            self._sample = self._fresh(reading, command_pa, told_pa)
+            self._told_pa = command_pa
 
     def begin(self) -> None:
         """Be called regularly from now on. What took long before that is no stall, but the device is looked at.
@@ -266,11 +324,10 @@ class Link:
 
     def _overwritten_pa(self) -> float | None:
         """Return what the device holds, if it is time to ask, and it is not what it was told."""
-        every_s, told_pa, driver = self._settings.read_back_s, self._told_pa, self._reads_back
-        now_s = self._sample.now_s
-        if every_s == 0 or told_pa is None or now_s - self._read_back_s < every_s or driver is None:
+        told_pa, driver = self._told_pa, self._reads_back
+        if not self._reads_back_now or told_pa is None or driver is None:
             return None
-        self._read_back_s = now_s
+        self._read_back_s = self._sample.now_s
         self._read_backs += 1
         settings = self._keeps_settings
         if self._read_backs % SETTINGS_EVERY == 0 and settings is not None and settings.has_settings:
@@ -282,6 +339,14 @@ class Link:
         self._told_pa = None
         self._say(logging.ERROR, "another master wrote the set point", held_pa=held_pa, told_pa=told_pa)
         return held_pa
+
+    @property
+    def _reads_back_now(self) -> bool:
+        """Whether it is time to ask what the device holds."""
+        every_s = self._settings.read_back_s
+        if every_s == 0 or self._told_pa is None or self._reads_back is None:
+            return False
+        return self._sample.now_s - self._read_back_s >= every_s
 
     def _require_settings(self, driver: KeepsSettings) -> None:
         """Have a device looked at that has lost its settings."""

@@ -85,6 +85,22 @@ class RealTimePace:
 
     def wait(self) -> int:
         """Sleep, then spin, until the next deadline. A missed one is not made up for."""
+        missed = self.next_due()
+        due_s = self.due_s
+        rest_s = due_s - self._spin_s - time.monotonic()
+        if rest_s > 0:
+            time.sleep(rest_s)
+        while time.monotonic() < due_s:
+            pass
+        return missed
+
+    @property
+    def due_s(self) -> float:
+        """When the next cycle begins, on the monotonic clock."""
+        return self._due_s or 0.0
+
+    def next_due(self) -> int:
+        """Set the next deadline; return how many periods were missed since the last."""
         now_s = time.monotonic()
         if self._due_s is None:
             self._due_s = now_s if self._phase_s is None else now_s - (now_s - self._phase_s) % self.period_s
@@ -94,11 +110,6 @@ class RealTimePace:
             missed = int((now_s - due_s) / self.period_s)
             due_s += missed * self.period_s
         self._due_s = due_s
-        rest_s = due_s - self._spin_s - now_s
-        if rest_s > 0:
-            time.sleep(rest_s)
-        while time.monotonic() < due_s:
-            pass
         return missed
 
     def now_s(self, device_time_s: float | None) -> float:  # noqa: ARG002 - ages are by the gateway's clock
