@@ -1,7 +1,7 @@
 """The calibration of the loops' evidence: `python -m benchmarks.loops [--drawn N] [--data FOLDER]`.
 
 It prints what `workbench.loops.calibration`, `LIMITS.sticks_probability` and `LIMITS.least_interval` hold: three
-numbers from N drawn loops of the seeds from 1000 on, and the threshold from N others of the seeds from 2000 on. Of
+numbers from N drawn loops of the seeds from 1000 on, and of N others of the seeds from 2000 on how many are wrong. Of
 FOLDER, loops of others with labels (`positioner bench --labelled`), none calibrates anything: it prints how well they
 are told. How often a verdict is right on further loops says `positioner bench`. Last comes how long a day at one sample
 a second takes.
@@ -27,7 +27,8 @@ from workbench.loops.thresholds import LIMITS
 
 NUMBERS, THRESHOLD = 1000, 2000
 """First seeds of the loops that the three numbers and the threshold are from."""
-MOST_WRONG = 0.05
+OF_A_PLANT = 0.2
+"""Share of a plant's loops that stick: a fifth to a third, by the literature."""
 DAY = 86_400
 
 
@@ -73,15 +74,14 @@ def scored(told: Sequence[Told], by: Calibration) -> tuple[Array, np.ndarray]:
     return np.array([by.probability(each.evidence) for each in told]), np.array([each.sticks for each in told])
 
 
-def threshold(told: Sequence[Told], by: Calibration) -> float:
-    """Return the least p from which on (1 + wrong) / called is at most 5 %: conformal selection."""
-    scores, sticks = scored(told, by)
-    kept = 1.0
-    for score in sorted(scores, reverse=True):
-        called = scores >= score
-        if (1 + (called & ~sticks).sum()) / called.sum() <= MOST_WRONG:
-            kept = float(score)
-    return kept
+def most_wrong(called: np.ndarray, sticks: np.ndarray) -> float:
+    """Return the share of those called that is wrong at most, in a plant of which one loop in five sticks.
+
+    Conformal selection: one more is taken for wrong, and others count as often as a plant has them.
+    """
+    weight = sticks.sum() / (~sticks).sum() * (1.0 / OF_A_PLANT - 1.0)
+    wrong = weight * (1 + (called & ~sticks).sum())
+    return float(wrong / ((called & sticks).sum() + wrong))
 
 
 def counted(said: np.ndarray, wrong: np.ndarray) -> str:
@@ -91,11 +91,12 @@ def counted(said: np.ndarray, wrong: np.ndarray) -> str:
 def calibration(numbers: Sequence[Told], others: Sequence[Told], labelled: Sequence[Told]) -> Iterator[str]:
     """Yield what the calibration is, and how well it tells loops that it was not made from."""
     fitted = calibrate([e.evidence for e in numbers], np.array([float(e.sticks) for e in numbers]))
-    least = threshold(others, fitted)
+    least = LIMITS.sticks_probability
     scores, sticks = scored(others, fitted)
     yield f"{len(numbers)} drawn loops: {fitted}"
     yield f"{len(others)} others: AUC {area(scores, sticks):.3f}"
-    yield f"from {least:.3f} on: {counted(scores >= least, ~sticks)}"
+    of_a_plant = 100 * most_wrong(scores >= least, sticks)
+    yield f"from {least:g} on: {counted(scores >= least, ~sticks)}; in a plant {of_a_plant:.1f} % at most"
     yield f"below {LIMITS.other_probability:g}: {counted(scores < LIMITS.other_probability, sticks)}"
     off = [abs(np.log(e.size_ratio)) for e, p in zip(others, scores, strict=True) if p >= least and e.size_ratio]
     yield f"95 % of those called lie within {np.quantile(off, 0.95):.3f} in logarithm" if off else "none called"

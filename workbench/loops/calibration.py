@@ -6,9 +6,9 @@
 E evidence for friction, X what friction explains beyond the disturbance alone, nats: what a wrong model of the process
 leaves grows with what there is to explain. PV is asked what it is by the stem, OP what it is once round the loop.
 
-Fitted on drawn loops, each once; no loop of a plant. A loop is called sticking from that p on at which, of drawn loops
-that the numbers are not from, (1 + wrong) / called is at most 5 %: conformal selection (Jin and Candes 2023).
-`python -m benchmarks.loops` prints both.
+Fitted on drawn loops, each once; on no loop of a plant. From a threshold of p on a loop is called sticking. There at
+most 5 % are wrong in a plant of which one loop in five sticks: conformal selection on drawn loops that the numbers are
+not from, which takes one more for wrong (Jin and Candes 2023). `python -m benchmarks.loops` prints both.
 """
 
 from collections.abc import Sequence
