@@ -95,7 +95,7 @@ docs: $(READY)          ## the documents' pictures and figures, made anew
 	$(BIN)/python -m docs.drawings docs/img
 	$(BIN)/python -m docs.code_tables
 	$(BIN)/python -m sim.effects docs/effects.md
-	$(BIN)/python docs/notebook.py docs/tutorial.md docs/slow-data.md docs/recordings.md docs/valve-file.md
+	$(BIN)/python docs/notebook.py docs/tutorial.md docs/recordings.md docs/valve-file.md
 
 clean:
 	rm -rf $(VENV) .mypy_cache .ruff_cache .pytest_cache demo-out build dist

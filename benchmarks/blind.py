@@ -32,7 +32,7 @@ from config.recording import Recording
 from config.valve_file import ValveFile, find_valve, load_valve
 from sim.effect import shipped_effect, tried_effects
 from tests.workbench.generators import KINDS, LAWS, case
-from workbench.blind.hiding import VISIBLE, hide
+from workbench.blind.hiding import VISIBLE_FLOORS, hide
 from workbench.blind.trial import NOISE_M
 from workbench.diagnosis.diagnosis import Diagnosis, diagnose
 from workbench.select.effect_candidates import indistinguishable
@@ -124,7 +124,7 @@ def line(family: str, seed: int) -> Line:
         "seed": seed,
         "setting": posed.setting,
         "hidden": list(posed.hidden),
-        "visible": posed.visible and _missed_m(found, posed.fit_floor_m) > VISIBLE * posed.fit_floor_m,
+        "visible": posed.visible and _missed_m(found, posed.fit_floor_m) > VISIBLE_FLOORS * posed.fit_floor_m,
         "verdict": found.verdict,
         "missing": list(found.missing),
         **({"equivalent": _is_equivalent(found, posed)} if family == "removed" else {}),
@@ -199,8 +199,34 @@ def single(each: Line) -> bool:
     return each["verdict"] == "one_of" and len(each["sets"]) == 1 and set(each["sets"][0]) <= _same(each["missing"][0])
 
 
+def summary(lines: Sequence[Line]) -> Iterator[str]:
+    """Yield the table of docs/blind.md: a row a family; what is counted is visible, but where nothing is hidden."""
+    heads = ("cases", "visible", "true effect named", "one alone named: right", "unexplained", "none named")
+    yield f"| family | {' | '.join(heads)} | error over the floor | s a case |"
+    yield "|---" * (len(heads) + 3) + "|"
+    for family in SEEDS:
+        chosen = [each for each in lines if each["family"] == family]
+        seen = [each for each in chosen if each["visible"] or family == "nothing"]
+        if not seen:
+            continue
+        ones = [first(each) for each in seen if single(each)]
+        row = [
+            len(chosen),
+            sum(each["visible"] for each in chosen if each["hidden"]),
+            sum(any(named(each, name) for name in each["hidden"]) for each in seen),
+            f"{sum(ones)} of {len(ones)}",
+            sum(each["verdict"] in {"unexplained", "untrusted"} for each in seen),
+            sum(not each["missing"] for each in seen),
+            f"{np.median([each['best_rmse_m'] / each['floor_m'] for each in seen]):.2f}",
+            f"{np.median([each['cpu_seconds'] for each in chosen]):.0f}",
+        ]
+        yield f"| {family} | {' | '.join(map(str, row))} |"
+
+
 def report(lines: Sequence[Line]) -> Iterator[str]:
     """Yield the figures, family by family, and the confusion table."""
+    yield from summary(lines)
+    yield ""
     for family in SEEDS:
         chosen = [each for each in lines if each["family"] == family]
         if chosen:

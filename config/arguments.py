@@ -54,20 +54,20 @@ def kinds_held(function: Callable[P, R]) -> Callable[P, R]:
         InputError: it is called with something else; says with which, for which argument, and what is allowed.
     """
     parameters = inspect.signature(function).parameters
-    allowed = {name: _wanted(each.annotation) for name, each in parameters.items()}
+    allowed = {name: _kinds_of(each.annotation) for name, each in parameters.items()}
 
     @wraps(function)
     def held(*args: P.args, **kwargs: P.kwargs) -> R:
         for name, given in {**dict(zip(parameters, args, strict=False)), **kwargs}.items():
             wanted = allowed.get(name)
             if wanted and not any(each.allows(given) for each in wanted):
-                raise InputError(name, f"must be {' or '.join(map(str, wanted))}, got {_shown(given, wanted)}")
+                raise InputError(name, f"must be {' or '.join(map(str, wanted))}, got {_show_given(given, wanted)}")
         return function(*args, **kwargs)
 
     return held
 
 
-def _wanted(annotation: Any) -> tuple[_Wanted, ...]:
+def _kinds_of(annotation: Any) -> tuple[_Wanted, ...]:
     """Return the kinds that an annotation names; none where it names something else, too."""
     parts = get_args(annotation) if isinstance(annotation, UnionType) else (annotation,)
     found = [(get_args(each)[0], True) if get_origin(each) is Sequence else (each, False) for each in parts]
@@ -76,7 +76,7 @@ def _wanted(annotation: Any) -> tuple[_Wanted, ...]:
     return tuple(_Wanted(kind, listed) for kind, listed in found)
 
 
-def _shown(given: object, wanted: Sequence[_Wanted]) -> str:
+def _show_given(given: object, wanted: Sequence[_Wanted]) -> str:
     """Return what was given: itself where it is short, else its kind; of one where a list is wanted, that list."""
     if any(each.listed and isinstance(given, each.kind) for each in wanted) and isinstance(given, str):
         return f"{given!r}; one is [{given!r}]"

@@ -19,7 +19,7 @@ from config.quantities import QUANTITIES, WRITABLE, ActionName
 
 FIRST_OBJECT = 0x2000
 """Manufacturer-specific objects begin here."""
-CONTROL_WORD, STATUS_WORD = 0x6040, 0x6041
+CONTROL_WORD, STATUS_WORD = 0x6040, 0x6041  # objects of CiA 408
 SYNC_IDS = (range(0x80, 0x101), range(0x181, 0x581), range(0x680, 0x6E0))
 """Where CiA 301 lets SYNC be; of these, those of PDOs and emergencies are free where no node has them."""
 SHIPPED_EDS = SHIPPED / "profiles" / "positioner.eds"
@@ -89,12 +89,12 @@ class ObjectMap(Schema):
         return command if self.control_word is None else {**command, "control_word": self.control_word}
 
 
-def _simulated_objects() -> ObjectMap:
+def _lay_out_objects() -> ObjectMap:
     entries = {each.name: Entry(index=FIRST_OBJECT + n) for n, each in enumerate(QUANTITIES)}
     return ObjectMap(**entries, control_word=Entry(index=CONTROL_WORD), status_word=Entry(index=STATUS_WORD))
 
 
-SIMULATED_OBJECTS = _simulated_objects()
+SIMULATED_OBJECTS = _lay_out_objects()
 
 
 class CanBus(Schema):

@@ -70,9 +70,9 @@ class Fault(Code):
     NONE = 0, "none"
     NO_REPLY = 1, "no reply"
     STALE = 2, "the measurement has stood still"
-    IMPLAUSIBLE = 3, "a measurement that cannot be"
-    DEVICE = 4, "the device said that it is unfit"
-    RESTARTED = 5, "device restarted, or missed commands: it is back with another than the last one it was given"
+    IMPLAUSIBLE = 3, "the measurement is impossible"
+    DEVICE = 4, "the device reports that it is unfit"
+    RESTARTED = 5, "the device restarted or missed commands: it holds another command than the last one"
     DCS_SILENT = 6, "DCS silent"
     STALLED = 7, "the daemon stood still"
     OTHER_MASTER = 8, "another master wrote the set point"
@@ -103,10 +103,10 @@ GOOD, REPEATED, LOST, NO_NUMBER = Quality
 class InhibitReason(Code):
     """Why the law, or the excitation, is not doing what was asked; served as register `why`."""
 
-    NOTHING = 0, "it is"
+    NOTHING = 0, "as asked"
     NOT_AUTOMATIC = 1, "not automatic"
     NO_ESTIMATES = 2, "no estimates"
-    NO_MOVE_ASKED = 3, "no move asked"
+    NO_MOVE_ASKED = 3, "no move is asked for"
     ALPHA_BELOW_BREAKAWAY = 4, "alpha below break-away"
     EXCITATION_BEYOND_LIMITS = 5, "excitation beyond pressure limits"
     EXCITATION_TOO_LONG = 6, "excitation too long"
@@ -114,40 +114,40 @@ class InhibitReason(Code):
     LAW_BEYOND_LIMITS = 8, "the law asks for a pressure beyond the limits"
     STUCK = 9, "stuck: the longest slide allowed does not move the stem"
     TRIM_ENDED = 10, "the trim ended outside its dead band"
-    EXCURSION_BEYOND_LIMIT = 11, "a small move needs an excursion beyond the limit set"
-    EXCURSION_WAITS = 12, "a small move waits, for the last excursion was too recent"
+    EXCURSION_BEYOND_LIMIT = 11, "a small move needs more overtravel than [control] excursion_limit"
+    EXCURSION_WAITS = 12, "a small move waits: the last excursion was too recent"
     STAIRCASE_IN_VAIN = 13, "the staircase of slides gave no static law (see its reason)"
-    EXCURSION_BUDGET_SPENT = 14, "a small move waits, for the day's travel of the packing is spent"
-    REFERENCE_COMES = 15, "a small move waits, for references keep coming that may take it back"
-    RESTORED_WAITS = 17, "a reference waits until the stem rests, for what was restored is provisional"
+    EXCURSION_BUDGET_SPENT = 14, "a small move waits: the day's travel of the packing is spent"
+    REFERENCE_COMES = 15, "a small move waits: the reference keeps changing"
+    RESTORED_WAITS = 17, "a reference waits until the stem rests: what was restored is provisional"
     RESTORED_CONTRADICTED = 18, "the first landings contradict what was restored: identify the valve"
     EXCITATION_OUTSIDE_WINDOW = 19, "excitation: the stem is outside the travel window"
     EXCITATION_NO_CONSENT = 20, "excitation: no consent of the DCS"
     EXCITATION_VETOED = 21, "excitation: vetoed"
     EXCITATION_UNMEASURED = 22, "excitation waits for a good measurement"
-    STAIRCASE_UNANSWERED = 23, "the staircase of slides: the stem does not answer: its sensor is frozen, or it is stuck"
-    NOT_AT_REST = 24, "a slide waits, for the stem does not come to rest: it creeps, or is moved by something else"
+    STAIRCASE_UNANSWERED = 23, "the staircase of slides: the stem does not answer: it is stuck, or its sensor is frozen"
+    NOT_AT_REST = 24, "a slide waits: the stem creeps, or something else moves it"
     EXCITATION_FROM_BEFORE = (
         25,
-        "excitation: eta_1 = 0 is from before a fault, or before another mode: write 1, then 0",
+        "excitation: eta_1 = 0 is older than the last fault or mode; write 1, then 0",
     )
     STAIRCASE_REVERSED = (
         26,
-        "the staircase of slides: more pressure takes the stem down: one of the two is reversed, or [valve] action",
+        "the staircase of slides: the position falls as the pressure rises: look at wiring, scales and [valve] action",
     )
-    CUT_OFF = 27, "the reference is beyond a cut-off, so the stem is pressed onto its stop"
-    PRESSURE_ELSEWHERE = 28, "a slide waits, for the measured pressure is not the one commanded: the supply may be low"
+    CUT_OFF = 27, "the reference is beyond a cut-off: the stem is pressed onto its stop"
+    PRESSURE_ELSEWHERE = 28, "a slide waits: the measured pressure is not the command: the supply may be low"
     ONE_DIRECTION = (
         29,
-        "one direction identified: the first move the other way goes by steps, until the stem has landed",
+        "one direction is identified: the first move the other way goes by steps until the stem has landed",
     )
-    PRESLIDING = 30, "the packing gives way under the stem: it is moved directly, without a slide"
+    PRESLIDING = 30, "the packing gives way: the stem is moved directly, without a slide"
 
 
 class Restored(Code):
     """What has become of what the daemon knew of the valve before it was started anew."""
 
-    NOTHING = 0, "nothing was"
+    NOTHING = 0, "nothing was restored"
     PROVISIONAL = 1, "provisional: the first landings must agree"
     CONFIRMED = 2, "confirmed by the first landings"
     DROPPED = 3, "dropped: a landing contradicts it"
@@ -167,7 +167,7 @@ class ExperimentState(Code):
     NOT_AUTOMATIC = 4, "not automatic"
     NO_CONSENT = 5, "no consent of the DCS"
     VETOED = 6, "vetoed"
-    EXCITED = 7, "eta_1 asks for another excitation"
+    EXCITED = 7, "eta_1 is 0: S3 is asked for"
     NO_MEASUREMENT = 8, "no good measurement"
     OUTSIDE_WINDOW = 9, "the stem is outside the travel window"
     NO_SEQUENCE = 10, "no sequence: at least two points, times from 0 up"
@@ -191,15 +191,15 @@ class ValveTestVerdict(Code):
     FRICTION_HIGH = 1, "friction high"
     FRICTION_LOW = 2, "friction low"
     TRAVEL_NOT_REACHED = 3, "the least travel was not reached"
-    TRAVEL_EXCEEDED = 4, "the most travel was passed"
+    TRAVEL_EXCEEDED = 4, "the stem went too far"
     NOT_SEATED = 5, "the stem is not back where it was"
     DEVIATION = 6, "the stem does not rest before the test: it is moved by something else"
     PRESSURE_THRESHOLD = 7, "the pressure threshold was reached before the travel"
     NOT_MOVED = 8, "the stem did not move"
     NO_SUPPLY = 9, "the pressure does not follow the command: no supply, or no I/P"
-    STROKE_DIFFERS = 10, "the travel is another than the file says"
+    STROKE_DIFFERS = 10, "the travel is not that of the file"
     BROKEN_OFF = 11, "broken off"
-    UNDETERMINED = 12, "cannot be told"
+    UNDETERMINED = 12, "undecided"
     CHANGED = 13, "figures have changed since the record it is compared with"
     SLOW = 14, "slower than the reference"
     NO_SPRING = 15, "no spring is seen: the stem goes from end to end at one command"
@@ -213,15 +213,15 @@ class Refusal(Code):
     NOT_ASKED = 2, "this estimate was not asked for"
     WAITING_FOR_MOTION = 3, "the stem has not been seen to move yet"
     WINDOW_TOO_SHORT = 4, "the stem moves, but not for long enough yet"
-    MOTION_ENDED = 5, "the stem stopped or turned round before it had moved for long enough"
-    RECORD_BROKEN = 6, "the samples had a gap or their clock jumped back; waiting for a new stretch of motion"
-    ILL_CONDITIONED = 7, "pressure or position varied too little while the stem moved to tell a, b and c apart"
+    MOTION_ENDED = 5, "the stem stopped or turned too early"
+    RECORD_BROKEN = 6, "the samples had a gap, or their clock jumped back; waits for a new motion"
+    ILL_CONDITIONED = 7, "pressure or position varied too little to separate a, b and c"
     NOISE_DOMINATES = (
         8,
-        "noise of the sensors, or what lies between the samples, outweighs what tells a, b and c apart: biased",
+        "noise hides a, b and c, or the samples are too far apart",
     )
     TOO_UNCERTAIN = 9, "the standard deviation is larger than allowed"
-    PARAMETERS_MISSING = 10, "friction needs a, b and c, and none have been identified yet"
+    PARAMETERS_MISSING = 10, "friction needs a, b and c, which are not identified yet"
     A_POSITIVE = 11, "a came out positive: viscous friction would drive the stem"
     B_NOT_NEGATIVE = 12, "b did not come out negative: the spring would push the stem away from rest"
     C_NOT_POSITIVE = 13, "c did not come out positive: pressure would pull the stem back"
@@ -229,33 +229,31 @@ class Refusal(Code):
     B_OVER_C_NOT_NEGATIVE = 15, "b/c did not come out negative: more pressure would hold the stem lower"
     K_OVER_C_NOT_NEGATIVE = 16, "k/c did not come out negative: friction would drive the stem"
     IMPLAUSIBLE_CHANGE = 17, "the value is too far from the one in use"
-    COMMANDS_MISSED = 18, "commands were missed in a gap of the samples: a, b and c singly hang on each of them"
+    COMMANDS_MISSED = 18, "commands were missed in a gap of the samples: a, b and c cannot be separated"
     MASS_NOT_IDENTIFIABLE = (
         19,
-        "the motion does not tell the mass: pressure changes, or samples follow, too slowly; "
-        "only b/c and k/c can be known",
+        "the mass cannot be separated: pressure changes, or samples, are too slow; only b/c and k/c can be known",
     )
     MODEL_DOES_NOT_FIT = (
         20,
-        "the motion is not that of the model, whether device.sampling is before or after: the residuals outweigh the "
-        "sensor's noise; or a part of the record contradicts the rest: a sensor that jumped; or the pressure "
-        "moves between samples (identification.pressure_held)",
+        "the motion is not that of the model: look for a sensor that jumped, at device.sampling, and at "
+        "identification.pressure_held",
     )
     LANDINGS_TOO_FEW = 21, "too few slides have ended in rest, or all in one direction"
     LANDINGS_NOT_STRAIGHT = 22, "the landings lie on no straight line: spring or friction change over the travel"
     CONTRADICTED_BY_LANDINGS = (
         23,
-        "slides land elsewhere than this says: a preload, or unlike friction up and down",
+        "slides land elsewhere: there is a preload, or friction differs up and down",
     )
     LANDINGS_SHIFTED = (
         27,
-        "landings before and after a moment disagree: the sensor jumped, or something shifted the stem; try again",
+        "landings disagree before and after a moment: the sensor jumped, or the stem was shifted; try again",
     )
     PRELOAD_EXPLAINS_AS_WELL = 28, "a preload would explain the motion as well, with another b/c"
     DRIFT_EXPLAINS_AS_WELL = 32, "a sensor that drifts would explain the motion as well, with another b/c or k/c"
-    TOO_SLOW = 30, "the stem moves too slowly, or too much as its command does, for its inertia to show: step it"
+    TOO_SLOW = 30, "the stem moves too slowly to show its inertia: use steps"
     NO_BREAKAWAY = 31, "the stem has not been seen to break away from a rest"
-    BROKEN_OFF = 29, "S3 was broken off before it was complete: by a fault, another mode, or a stem that did not answer"
+    BROKEN_OFF = 29, "S3 was broken off: by a fault, another mode, or a stem that did not answer"
 
 
 class Sampling(Code):
@@ -300,13 +298,13 @@ class Ne107Cause(Code):
     COMMAND_RATE = 18, "command changes too fast"
     NOT_AT_REST = 19, "the stem does not come to rest"
     PRESSURE_ELSEWHERE = 20, "the measured pressure is not the one commanded"
-    ONE_DIRECTION = 21, "one direction identified: how far a move goes the other way is not known"
+    ONE_DIRECTION = 21, "one direction is identified; the other is not known"
     HIGH_HIGH = 22, "opening above its highest limit"
     HIGH = 23, "opening above its high limit"
     LOW = 24, "opening below its low limit"
     LOW_LOW = 25, "opening below its lowest limit"
     TEST_OVERDUE = 26, "a test on the valve is overdue"
-    MODEL_CHANGED = 27, "the spring is not the one identified first"
+    MODEL_CHANGED = 27, "the spring differs from the one identified first"
 
 
 class EndTrend(Code):
@@ -314,7 +312,7 @@ class EndTrend(Code):
 
     NOT_KNOWN = 0, "not known: shut on too few days"
     STEADY = 1, "steady"
-    RISING = 2, "rising: the plug seats ever higher, something grows on the seat or lies under it"
+    RISING = 2, "rising: the plug seats ever higher; something grows on the seat or lies there"
     FALLING = 3, "falling: the plug seats ever lower, the seat wears"
     JUMPED = 4, "jumped: the zero has shifted"
     SCATTERED = 5, "scattered: the plug seats elsewhere each time"

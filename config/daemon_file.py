@@ -440,16 +440,16 @@ def load_valves(path: Path) -> tuple[DaemonFile, ...]:
     tables, source = read_toml(path), str(path)
     require_kind(tables, "daemon", source)
     if not tables.get("valve") or not isinstance(tables["valve"], list):
-        return (_validated(tables, source, path.parent),)
+        return (_validate(tables, source, path.parent),)
     numbered = enumerate(tables["valve"], 1)
     each_valve = (_tables_of_one(tables, entry, f"{source}: valve {number}") for number, entry in numbered)
-    files = tuple(_validated(each, where, path.parent) for each, where in each_valve)
+    files = tuple(_validate(each, where, path.parent) for each, where in each_valve)
     if problem := _conflict(files) or _crowded_line(files):
         raise InputError(source, problem)
     return tuple(_beside_others(file, files) for file in files)
 
 
-def _validated(tables: dict[str, Any], source: str, folder: Path) -> DaemonFile:
+def _validate(tables: dict[str, Any], source: str, folder: Path) -> DaemonFile:
     """Return one valve's file; what a rotary valve has in degrees is in rad inside."""
     valve = tables.get("valve")
     if isinstance(valve, dict) and "travel_deg" in valve:
@@ -469,7 +469,7 @@ def _tables_of_one(tables: dict[str, Any], entry: Any, where: str) -> tuple[dict
     for key in ("name", "unit"):
         if key not in entry:
             raise InputError(where, f"valve.{key}: is required and missing")
-    own = {key: _merged(tables.get(key, {}), entry[key]) for key in entry.keys() & OWN}
+    own = {key: _merge(tables.get(key, {}), entry[key]) for key in entry.keys() & OWN}
     supervisory = tables.get("supervisory", {})
     if not isinstance(supervisory, dict):
         raise InputError(where, f"supervisory: must be a table, got {supervisory!r}")
@@ -479,7 +479,7 @@ def _tables_of_one(tables: dict[str, Any], entry: Any, where: str) -> tuple[dict
     return {**tables, **own, "valve": valve, "supervisory": {**supervisory, "unit": entry["unit"]}}, where
 
 
-def _merged(common: Any, own: Any) -> Any:
+def _merge(common: Any, own: Any) -> Any:
     """Return a table with what is this valve's put over what is everybody's; what is no table is left to the schema."""
     if not isinstance(common, dict) or not isinstance(own, dict):
         return own

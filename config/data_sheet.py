@@ -13,7 +13,7 @@ from config.errors import InputError
 from config.valve_file import EffectTable, ValveFile, ValveParameters
 
 FRICTION_PERCENT = 5.0
-BREAKAWAY_RATIO = 1.3
+BREAKAWAY_RATIO = 1.3  # F_s/F_c where nothing is known
 KG_PER_M2 = 8.0 / 0.07
 """Plate, stem and plug: 8 kg go with 700 cm2."""
 DAMPING_S = 15e-3
@@ -23,7 +23,7 @@ STOP_STIFFNESS, STOP_DAMPING = 2000.0, 16.0
 STIFFNESS_N_PER_M, DAMPING_NS_PER_M = (1e5, 1e9), (0.0, 1e5)
 """What such a contact may have (`sim.effects.end_stop`)."""
 STRIBECK_M_PER_S = 5e-4
-DEADZONE = 0.5
+DEADZONE = 0.5  # Karnopp's band, share of the Stribeck velocity
 ALLOWED = {"area_cm2": 1e5, "stroke_mm": 1500.0, "friction_percent": 90.0, "breakaway_ratio": 10.0, "mass_kg": 1e4}
 """The most of each."""
 HIGHEST_BAR = 10.0
@@ -79,17 +79,17 @@ def from_data_sheet(sheet: DataSheet) -> tuple[ValveFile, list[str], list[str]]:
     mass_kg = sheet.mass_kg or KG_PER_M2 * area_m2
     valve = ValveParameters(
         name=sheet.name,
-        mass_kg=_rounded(mass_kg),
-        diaphragm_area_m2=_rounded(area_m2),
-        spring_n_per_m=_rounded(spring),
-        viscous_ns_per_m=_rounded(DAMPING_S * spring),
-        coulomb_n=_rounded(coulomb_n),
-        static_n=_rounded(ratio * coulomb_n),
+        mass_kg=_round_digits(mass_kg),
+        diaphragm_area_m2=_round_digits(area_m2),
+        spring_n_per_m=_round_digits(spring),
+        viscous_ns_per_m=_round_digits(DAMPING_S * spring),
+        coulomb_n=_round_digits(coulomb_n),
+        static_n=_round_digits(ratio * coulomb_n),
         stribeck_velocity_m_per_s=STRIBECK_M_PER_S,
         deadzone_ratio=DEADZONE,
-        stroke_m=_rounded(stroke_m),
+        stroke_m=_round_digits(stroke_m),
     )
-    preload = EffectTable.model_validate({"name": "preload", "force_n": _rounded(closed_pa * area_m2)})
+    preload = EffectTable.model_validate({"name": "preload", "force_n": _round_digits(closed_pa * area_m2)})
     stops = EffectTable.model_validate(
         {
             "name": "end_stop",
@@ -119,9 +119,9 @@ def from_data_sheet(sheet: DataSheet) -> tuple[ValveFile, list[str], list[str]]:
 
 
 def _within(value: float, allowed: tuple[float, float]) -> float:
-    return _rounded(min(max(value, allowed[0]), allowed[1]))
+    return _round_digits(min(max(value, allowed[0]), allowed[1]))
 
 
-def _rounded(value: float) -> float:
+def _round_digits(value: float) -> float:
     """Return a value with the six digits that a data sheet never has."""
     return float(f"{value:.6g}")

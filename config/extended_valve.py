@@ -16,7 +16,7 @@ from math import inf
 from typing import NamedTuple
 
 Table = tuple[float, ...]
-INSTANT = 1e9
+INSTANT_PA_PER_S = 1e9
 """Pa/s: a pressure that changes so fast is there at once."""
 SAME_STROKE, SAME_BREAKAWAY = 1e-3, 1.5
 """Share of the stroke, and factor on F_s/A, by which two descriptions of one valve may differ."""
@@ -52,7 +52,11 @@ class Inverse(NamedTuple):
     @property
     def delays(self) -> bool:
         """Whether the pressure arrives later than its command."""
-        return self.lag_s > 0.0 or self.dead_time_s > 0.0 or min(self.filling_pa_per_s, self.venting_pa_per_s) < INSTANT
+        return (
+            self.lag_s > 0.0
+            or self.dead_time_s > 0.0
+            or min(self.filling_pa_per_s, self.venting_pa_per_s) < INSTANT_PA_PER_S
+        )
 
     def joined(self, other: "Inverse") -> "Inverse":
         """Return what undoes both."""

@@ -3,7 +3,7 @@
 import re
 from ipaddress import ip_address
 
-LONGEST_NAME = 253
+LONGEST_NAME = 253  # characters, RFC 1035
 LABEL = re.compile(r"(?!-)[A-Za-z0-9_-]{1,63}(?<!-)")
 """One label of a name, as RFC 1123 section 2.1 has it; and the underscore, which sites use."""
 

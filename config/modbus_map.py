@@ -248,7 +248,7 @@ def _within(places: Run, most: int) -> Iterable[Run]:
         yield run
 
 
-def _simulated_map() -> ModbusMap:
+def _lay_out_map() -> ModbusMap:
     """Lay the quantities one after another from register 0."""
     places: dict[str, Any] = {}
     address = 0
@@ -258,4 +258,4 @@ def _simulated_map() -> ModbusMap:
     return ModbusMap(**places)
 
 
-SIMULATED_MAP = _simulated_map()
+SIMULATED_MAP = _lay_out_map()

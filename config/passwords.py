@@ -11,7 +11,7 @@ from hashlib import scrypt
 from hmac import compare_digest
 from time import monotonic
 
-MOST_WRONG = 5
+MOST_WRONG = 5  # in a row; then all wait
 PAUSE_S = 30.0
 SALT_BYTES = 16
 COST = {"n": 2**14, "r": 8, "p": 1}

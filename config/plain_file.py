@@ -7,7 +7,7 @@ from config.errors import InputError
 
 MOST_BYTES = 10_000_000
 """Of a configuration or a data sheet."""
-MOST_COLUMNS = 2000
+MOST_COLUMNS = 2000  # a file of more is no recording
 MOST_VALUES = 250_000_000
 """Of a table that declares how large it is, as Parquet does in a few bytes: 2 GB of numbers."""
 

@@ -15,7 +15,7 @@ from config.recording import Column, Recording
 
 LONGEST_STROKE_M = 1.5
 LARGEST_PA, LEAST_SPAN_PA = 2e6, 200.0
-FEWEST_ROWS = 50
+FEWEST_JUDGED_ROWS = 50
 REVERSE = -0.5
 """Correlation of command and position below which the valve closes with pressure."""
 MISSING = 0.05
@@ -24,25 +24,25 @@ RESPONDS_TOO_EARLY = 0.2
 """Share of the command's changes that the stem may have followed by the same row."""
 FAR = 5.0
 """Spans of all other positions between them and one that is no position."""
-GAP_PERIODS = 20.0
+HISTORIAN_GAP_PERIODS = 20.0
 MOVED = 0.02
 """Of the span of the positions: what counts as a move, and of the commands: as a change."""
 LONG_ROWS = 10
 """Rows for which a command is held, so that what the stem did before and after its change can be told apart."""
-ANSWER = 0.1
+ANSWER_SHARE = 0.1
 """Of the span of the positions: what counts as an answer to a change."""
 FEW_JUMPS = 3
-JUMP = 0.9
+JUMP_SHARE = 0.9
 """Of the span of the positions: a jump over nearly all of it."""
 WRAPS = 0.9
 """Of 65536 steps: what a register of 16 bits without its sign spans."""
-SELDOM, OFTEN = 0.2, 0.8
+SELDOM_SHARE, OFTEN = 0.2, 0.8
 """Parts of the rows in which a set point changes, and a measured position, with its noise."""
 UNLIKE = 0.02
 """Ratio of the spans of position and set point below which, or over whose inverse, their units differ."""
 STEADY_RUN_SHARE = 0.9
 """Part of the runs of equal positions that are as long as most, or twice, and so on."""
-STRAIGHT = 0.3
+STRAIGHT_SHARE = 0.3
 """Share of the moving rows on straight lines, from which on a historian drew them."""
 
 
@@ -61,7 +61,7 @@ def oddities(recording: Recording, stroke_m: float | None = None) -> list[str]:
     if np.ptp(position_m[whole]) == 0.0:
         where = f"{position_m[whole][0]:g} {kind.travel.si}"
         return [*said, f"the position is {where} throughout: a stem that never moves says nothing"]
-    asked = _asked(recording)
+    asked = _command_or_set_point(recording)
     if asked is None or (asked.name == "command_pa" and in_each_others_place(position_m, asked.values)):
         return [*said, *_of_repeats(recording.time_s, position_m, None), *_of_lines(position_m)]
     said += _of_constant(asked)
@@ -85,7 +85,7 @@ class _Asked:
     unit: str
 
 
-def _asked(recording: Recording) -> _Asked | None:
+def _command_or_set_point(recording: Recording) -> _Asked | None:
     """Return the command of a recording, or else its set point."""
     kind = recording.kind
     for name, words, unit in (
@@ -93,7 +93,7 @@ def _asked(recording: Recording) -> _Asked | None:
         ("reference_m", "set point", kind.travel.si),
     ):
         if (column := recording.columns.get(name)) is not None and np.isfinite(column).any():
-            return _Asked(name, _held(column), words, unit)
+            return _Asked(name, _hold_between(column), words, unit)
     return None
 
 
@@ -155,7 +155,7 @@ def _stands_for_none(position_m: Column) -> str | None:
 
 def _of_rows(recording: Recording) -> Iterator[str]:
     count = len(recording)
-    if count < FEWEST_ROWS:
+    if count < FEWEST_JUDGED_ROWS:
         rows = "1 row is" if count == 1 else f"{count} rows are"
         yield f"{rows} too few to fit anything to; some hundred are needed in which the stem moves"
     for name, column in recording.columns.items():
@@ -167,7 +167,7 @@ def _of_rows(recording: Recording) -> Iterator[str]:
         rows = f"sample {int(back.argmax()) + 2}" + (f", the first of {int(back.sum())}" if back.sum() > 1 else "")
         yield f"time_s does not increase at {rows}: the clock was set back; the workbench begins anew there"
     steps = steps[steps > 0.0]
-    if steps.size and steps.max() > GAP_PERIODS * np.median(steps):
+    if steps.size and steps.max() > HISTORIAN_GAP_PERIODS * np.median(steps):
         hour = " (an hour: a clock change in spring?)" if abs(steps.max() - 3600.0) < 5.0 * np.median(steps) else ""
         yield f"the longest gap is {steps.max():.4g} s, the samples are {np.median(steps):.4g} s apart{hour}"
 
@@ -190,13 +190,13 @@ def _of_setpoint(position_m: Column, reference_m: Column) -> Iterator[str]:
     """Yield what is odd about a set point beside the travel: one signal, the other's place, another unit."""
     whole = np.isfinite(position_m) & np.isfinite(reference_m)
     x, r = position_m[whole], reference_m[whole]
-    if x.size < FEWEST_ROWS or np.ptp(r) == 0.0:
+    if x.size < FEWEST_JUDGED_ROWS or np.ptp(r) == 0.0:
         return
     if np.array_equal(x, r):
         yield "set point and position are one signal, to the last digit: which column is measured on the stem?"
         return
     changes_x, changes_r = (float((np.diff(each) != 0.0).mean()) for each in (x, r))
-    if changes_x < SELDOM and changes_r > OFTEN:
+    if changes_x < SELDOM_SHARE and changes_r > OFTEN:
         changing = f"the set point changes in {100 * changes_r:.0f} % of the rows"
         yield f"{changing}, the position in {100 * changes_x:.0f} %: do their columns stand in each other's place?"
     if not UNLIKE < np.ptp(x) / np.ptp(r) < 1.0 / UNLIKE:
@@ -228,14 +228,14 @@ def _of_registers(position_m: Column, kind: Kind) -> Iterator[str]:
     x = position_m[np.isfinite(position_m)]
     steps = np.abs(np.diff(x))
     gaps = np.diff(np.unique(x))
-    if x.size < FEWEST_ROWS or not gaps.size:
+    if x.size < FEWEST_JUDGED_ROWS or not gaps.size:
         return
-    jumps = steps[steps > JUMP * np.ptp(x)]
+    jumps = steps[steps > JUMP_SHARE * np.ptp(x)]
     quantum = float(gaps[gaps > 0.0].min())
     counts = float(np.ptp(x)) / quantum
     if jumps.size >= FEW_JUMPS and jumps.size < 0.5 * steps.size and WRAPS * 2**16 < counts < 2**16:
-        others = steps[steps <= JUMP * np.ptp(x)]
-        if others.size and float(others.max()) < (1.0 - JUMP) * np.ptp(x):
+        others = steps[steps <= JUMP_SHARE * np.ptp(x)]
+        if others.size and float(others.max()) < (1.0 - JUMP_SHARE) * np.ptp(x):
             yield (
                 f"positions jump {jumps.size} times by nearly all of 65536 steps of {quantum:.3g} {kind.travel.si}: a "
                 "register of 16 bits read without its sign? Numbers from 32768 on are then less by 65536"
@@ -245,7 +245,7 @@ def _of_registers(position_m: Column, kind: Kind) -> Iterator[str]:
 def _of_repeats(time_s: Column, position_m: Column, asked: Column | None) -> Iterator[str]:
     """Yield what is odd about positions that stand for several rows each: they are read more seldom than written."""
     changes = np.flatnonzero(np.diff(position_m) != 0.0)
-    if changes.size < FEWEST_ROWS / 2:
+    if changes.size < FEWEST_JUDGED_ROWS / 2:
         return
     if asked is not None:
         at = np.flatnonzero(np.diff(asked) != 0.0)
@@ -261,7 +261,7 @@ def _of_repeats(time_s: Column, position_m: Column, asked: Column | None) -> Ite
         )
 
 
-def _held(command_pa: Column) -> Column:
+def _hold_between(command_pa: Column) -> Column:
     """Return the commands with those in force where none is written, as of one that is kept with its changes alone."""
     known = np.isfinite(command_pa)
     return command_pa[np.maximum.accumulate(np.where(known, np.arange(known.size), 0))]
@@ -272,12 +272,12 @@ def _of_sampling(time_s: Column, position_m: Column, asked: _Asked) -> Iterator[
     t, x, u = time_s, position_m, asked.values
     whole = np.isfinite(x) & np.isfinite(u)
     t, x, u = t[whole], x[whole], u[whole]
-    if x.size < FEWEST_ROWS or np.ptp(u) == 0.0:
+    if x.size < FEWEST_JUDGED_ROWS or np.ptp(u) == 0.0:
         return
     dx, du = np.diff(x), np.diff(u)
     moves = np.abs(dx) > MOVED * np.ptp(x)
     period_s = float(np.median(np.diff(t)))
-    if ahead := _answered_before(x, u):
+    if ahead := _count_early_answers(x, u):
         yield (
             f"in {ahead[0]} of {ahead[1]} changes of the {asked.words} the stem had gone most of its way before: their "
             "clocks differ, or one column was shifted against the other"
@@ -303,7 +303,7 @@ def _of_sampling(time_s: Column, position_m: Column, asked: _Asked) -> Iterator[
         )
 
 
-def _answered_before(x: Column, u: Column) -> tuple[int, int] | None:
+def _count_early_answers(x: Column, u: Column) -> tuple[int, int] | None:
     """Return at how many changes, of how many, the stem was past half its way the row before; None where not at most.
 
     Its way is from where it was in the middle of the last hold to where it is in the middle of the next.
@@ -313,7 +313,7 @@ def _answered_before(x: Column, u: Column) -> tuple[int, int] | None:
     held = np.diff(bounds)
     middles = x[(bounds[:-1] + bounds[1:]) // 2]
     way = np.diff(middles)
-    told = (np.minimum(held[:-1], held[1:]) >= LONG_ROWS) & (np.abs(way) > ANSWER * np.ptp(x))
+    told = (np.minimum(held[:-1], held[1:]) >= LONG_ROWS) & (np.abs(way) > ANSWER_SHARE * np.ptp(x))
     gone = (x[changes - 1] - middles[:-1])[told] / way[told]
     before, of = int((gone > 0.5).sum()), int(told.sum())
     return (before, of) if of >= FEW_JUMPS and before > 0.5 * of else None
@@ -322,11 +322,15 @@ def _answered_before(x: Column, u: Column) -> tuple[int, int] | None:
 def _of_lines(position_m: Column) -> Iterator[str]:
     """Yield what is odd about positions on straight lines: a historian's."""
     x = position_m[np.isfinite(position_m)]
-    if x.size < FEWEST_ROWS:
+    if x.size < FEWEST_JUDGED_ROWS:
         return
     bends = np.abs(np.diff(x, 2)) < 1e-9 * np.ptp(x)
     moving = np.abs(np.diff(x)[1:]) > 1e-6 * np.ptp(x)
-    if moving.sum() > FEWEST_ROWS and float((bends & moving).sum() / moving.sum()) > STRAIGHT and x[1] != x[0]:
+    if (
+        moving.sum() > FEWEST_JUDGED_ROWS
+        and float((bends & moving).sum() / moving.sum()) > STRAIGHT_SHARE
+        and x[1] != x[0]
+    ):
         yield "many positions lie on straight lines: the historian drew them between its samples; export raw samples"
 
 

@@ -110,7 +110,7 @@ class Recording(Result):
         named = {names.get(name, name): column for name, column in columns.items()}
         said = {**metadata, **of_kind(kind)}
         if "position_m" not in named:
-            named["position_m"] = _integrated(named["time_s"], named["velocity_m_per_s"])
+            named["position_m"] = _integrate(named["time_s"], named["velocity_m_per_s"])
             said[INTEGRATED] = f"integrated from {kind.own('velocity_m_per_s')}, from zero"
         return cls(named, said)
 
@@ -296,7 +296,7 @@ def _as_measured(columns: Mapping[str, Column], names: Sequence[str]) -> tuple[d
     return kept, {NOT_MEASURED: allowed} if said else {}
 
 
-def _integrated(time_s: Column, velocity_m_per_s: Column) -> Column:
+def _integrate(time_s: Column, velocity_m_per_s: Column) -> Column:
     """Return the integral of a velocity, m, by trapezia, from zero; a value that is missing counts as the one before.
 
     What its sensor is off by drifts.

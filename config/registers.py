@@ -31,11 +31,11 @@ from config.quantities import DeviceStatus, listed_bits
 from config.register_format import Format, WireType
 from config.roles import Role
 
-MAP_VERSION = 1
-WORD_TEST = 0xB38C
-LONG_TEST = 0x12345678
-FLOAT_TEST = 1234.5
-MOST_POINTS = 200
+MAP_VERSION = 1  # grows where a register changes its meaning
+WORD_TEST = 0xB38C  # by these three a client finds its order of bytes
+LONG_TEST = 0x12345678  # each byte another
+FLOAT_TEST = 1234.5  # exact in a float32
+MOST_EXPERIMENT_POINTS = 200
 """Of an experiment."""
 
 
@@ -308,10 +308,14 @@ EXPERIMENT = (
         "1: tests may be commanded; 0 breaks one off",
     ),
     _operable("experiment_veto", 601, "uint16", "1", 0, 1, "1: no experiment and no S3; breaks one off"),
-    _writable("experiment_point", 602, "uint16", "1", 0, MOST_POINTS - 1, "which point is written; 0 begins anew"),
+    _writable(
+        "experiment_point", 602, "uint16", "1", 0, MOST_EXPERIMENT_POINTS - 1, "which point is written; 0 begins anew"
+    ),
     _writable("experiment_time", 603, "float32", "s", 0.0, 1e5, "its time; written together with the point"),
     _writable("experiment_pressure", 605, "float32", "Pa", 0.0, _LARGEST_PA, "its pressure; the same"),
-    _writable("experiment_start", 607, "uint16", "1", 2, MOST_POINTS, "write the number of points: plays them"),
+    _writable(
+        "experiment_start", 607, "uint16", "1", 2, MOST_EXPERIMENT_POINTS, "write the number of points: plays them"
+    ),
     Register("experiment_points", 608, "uint16", "1", "how many there are"),
     Register("experiment_state", 609, "uint16", "1", listed(ExperimentState)),
     Register("experiment_elapsed", 610, "float32", "s", "time since its first point, while it is under way"),

@@ -11,8 +11,8 @@ from config.whole_file import replace_whole
 ROLES = (Role.OBSERVER, Role.OPERATOR, Role.ENGINEER)
 WRITERS = ROLES[1:]
 """Who may sign in on a page: whoever sees it is an observer."""
-LEAST_LENGTH = 8
-OWN_ALONE = 0o600
+LEAST_LENGTH = 8  # characters, NIST SP 800-63B
+OWN_ALONE = 0o600  # the owner reads and writes
 
 
 def read_passwords(file: Path) -> dict[str, Password]:

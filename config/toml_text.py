@@ -31,14 +31,14 @@ def with_values(text: str, values: Mapping[tuple[str, str], Value], source: str 
     for (table, key), value in values.items():
         wanted.setdefault(table, {})
         if not isinstance(wanted[table], dict):
-            raise InputError(source, f"{table}: several of them; write {key} = {_said(value)} by hand")
+            raise InputError(source, f"{table}: several of them; write {key} = {_format_value(value)} by hand")
         wanted[table][key] = value
     lines = text.splitlines()
     for (table, key), value in values.items():
         lines = _with(lines, table, key, value)
     new = "\n".join(lines) + "\n"
     if _read(new) != wanted:
-        asked = ", ".join(f"{table}.{key} = {_said(value)}" for (table, key), value in values.items())
+        asked = ", ".join(f"{table}.{key} = {_format_value(value)}" for (table, key), value in values.items())
         raise InputError(source, f"cannot be changed without touching what else it says; write by hand: {asked}")
     return new
 
@@ -47,18 +47,18 @@ def _with(lines: list[str], table: str, key: str, value: Value) -> list[str]:
     heads = [number for number, line in enumerate(lines) if (match := HEAD.match(line)) and match[1] == table]
     if not heads:
         gap = [""] if lines and lines[-1].strip() else []
-        return [*lines, *gap, f"[{table}]", f"{key} = {_said(value)}"]
+        return [*lines, *gap, f"[{table}]", f"{key} = {_format_value(value)}"]
     first = heads[0] + 1
     last = next((number for number in range(first, len(lines)) if ANY_HEAD.match(lines[number])), len(lines))
     for number in range(first, last):
         if match := re.match(
             rf"^(\s*{re.escape(key)}\s*=\s*)([^#\"']*?|\"[^\"]*\"|'[^']*')(\s*(?:#.*)?)$", lines[number]
         ):
-            return [*lines[:number], f"{match[1]}{_said(value)}{match[3]}", *lines[number + 1 :]]
-    return [*lines[:first], f"{key} = {_said(value)}", *lines[first:]]
+            return [*lines[:number], f"{match[1]}{_format_value(value)}{match[3]}", *lines[number + 1 :]]
+    return [*lines[:first], f"{key} = {_format_value(value)}", *lines[first:]]
 
 
-def _said(value: Value) -> str:
+def _format_value(value: Value) -> str:
     # A JSON string, number or truth is a TOML one.
     return json.dumps(value)
 

@@ -7,7 +7,7 @@ from pydantic import Field, field_validator, model_validator
 
 from config.loading import Fraction, Many, NonNegative, Pair, Schema
 
-MOST_POINTS = 20
+MOST_POLYGON_POINTS = 20
 """Of a polygon."""
 NARROWEST_SPLIT = 0.05
 """Of the signal: of less, a DCS of 12 bits would have fewer than 200 steps for the whole travel."""
@@ -36,8 +36,8 @@ class TravelTable(Schema):
     def _points_rise(cls, points: tuple[tuple[float, float], ...]) -> tuple[tuple[float, float], ...]:
         if not points:
             return points
-        if not 2 <= len(points) <= MOST_POINTS:
-            raise ValueError(f"must have 2 to {MOST_POINTS} points, got {len(points)}")
+        if not 2 <= len(points) <= MOST_POLYGON_POINTS:
+            raise ValueError(f"must have 2 to {MOST_POLYGON_POINTS} points, got {len(points)}")
         if (points[0][0], points[-1][0]) != (0.0, 1.0):
             raise ValueError(f"must go from signal 0 to 1, got {points[0][0]:g} to {points[-1][0]:g}")
         for before, after in pairwise(points):

@@ -21,7 +21,7 @@ def write_valve(path: Path | str, file: ValveFile, remarks: Sequence[str] = ()) 
         InputError: it cannot be written.
     """
     path = Path(path)
-    seen = file.model_copy(update={"effect": tuple(_seen_from(path.parent, each) for each in file.effect)})
+    seen = file.model_copy(update={"effect": tuple(_relative_to(path.parent, each) for each in file.effect)})
     text = "".join(f"# {remark}\n" for remark in remarks) + valve_toml(seen)
     try:
         with beside(path) as new:
@@ -46,7 +46,7 @@ def _lines(table: Mapping[str, Any]) -> str:
     return "".join(f"{key} = {json.dumps(value)}\n" for key, value in table.items())
 
 
-def _seen_from(folder: Path, table: EffectTable) -> EffectTable:
+def _relative_to(folder: Path, table: EffectTable) -> EffectTable:
     """Return the table with an own effect's path, as seen from here, as seen from a folder."""
     if not table.name.endswith(".py"):
         return table

@@ -63,8 +63,12 @@ def stick_slip(figure_file: Path) -> None:
     below.set_xlabel("time, s")
     for axes in (above, below):
         shade(axes, rows)
+    peak = max(rows, key=lambda each: each.opening)
+    span = ((peak.time_s, 100.0 * peak.reference), (peak.time_s, 100.0 * peak.opening))
+    above.annotate("", *span, arrowprops={"arrowstyle": "<->", "color": INK})
+    above.text(peak.time_s + 0.03, 50.0 * (peak.reference + peak.opening), "overtravel", fontsize="small")
     above.legend(loc="upper right", fontsize="small")
-    above.set_title("A small step of a sticking stem; colours: states of the law of slides", fontsize="medium")
+    above.set_title("A small step of a sticking stem, and the states of the law of slides", fontsize="medium")
     figure.savefig(figure_file, dpi=120)
     plt.close(figure)
 
@@ -96,7 +100,7 @@ def run() -> Iterator[Row]:
         memory, decision = step(memory, sample, requests, settings)
         now_s = sample.time_s
         if decision.applied.ratios is None:
-            requests = replace(requests, eta=QUIET if decision.estimates.progress >= 1 else (0, 0, 0))
+            requests = replace(requests, eta=QUIET if decision.progress >= 1 else (0, 0, 0))
             if now_s > IDENTIFIED_WITHIN_S:
                 raise RuntimeError(f"not identified: {decision.applied.last_refusal.text}")
             continue
@@ -119,6 +123,13 @@ def asked(requests: Requests, reference_m: float) -> Requests:
     return replace(requests, reference_m=reference_m, reference_writes=requests.reference_writes + 1)
 
 
+MEANINGS = {
+    "Idle": "Idle: the stem rests",
+    "Out": "Out: a slide beyond the reference",
+    "Returning": "Returning: a slide back onto it",
+}
+
+
 def shade(axes: Axes, rows: list[Row]) -> None:
     """Colour the background by the law's state, named once."""
     begin, named = 0, set()
@@ -126,7 +137,7 @@ def shade(axes: Axes, rows: list[Row]) -> None:
         if at < len(rows) and rows[at].state == rows[begin].state:
             continue
         state, end_s = rows[begin].state, rows[min(at, len(rows) - 1)].time_s
-        label = f"_{state}" if state in named else state
+        label = f"_{state}" if state in named else MEANINGS.get(state, state)
         named.add(state)
         axes.axvspan(rows[begin].time_s, end_s, color=COLOURS.get(state, "#f2f2f2"), lw=0, label=label)
         begin = at

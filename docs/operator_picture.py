@@ -1,4 +1,4 @@
-"""The picture of the operator's page, made anew: `python -m docs.operator_picture [FILE.png]`.
+"""The pictures of the operator's page in both themes, made anew: `python -m docs.operator_picture [FILE.png]`.
 
 A simulated valve is identified and moved; then Chromium is asked for what it shows.
 """
@@ -19,11 +19,11 @@ HELD_S = 6.0
 
 
 def make(picture: Path) -> None:
-    """Make it."""
+    """Make them."""
     with tempfile.TemporaryDirectory() as name, valve_site(Path(name)) as site:
         words = ("page", "--config", str(site.config))
         with (
-            served(*words, port="--listen-port") as address,
+            served(*words) as address,
             opened(address) as page,
             Dcs("127.0.0.1", site.port) as dcs,
         ):
@@ -38,6 +38,10 @@ def make(picture: Path) -> None:
             page.get_by_test_id("work-out").click()
             page.get_by_test_id("moves").get_by_text("step").first.wait_for()
             page.screenshot(path=picture, full_page=True)
+            page.get_by_label("light or dark").click()
+            page.mouse.move(400, 300)  # off the button, whose tooltip would be in the picture
+            time.sleep(1.0)  # for the charts to be drawn in their new colours
+            page.screenshot(path=picture.with_stem(f"{picture.stem}-dark"), full_page=True)
 
 
 if __name__ == "__main__":

@@ -1,4 +1,4 @@
-"""The pictures of the workbench's page, made anew: `python -m docs.page_pictures FOLDER`. Needs Debian's Chromium."""
+"""The workbench's page in both themes, drawn anew: `python -m docs.page_pictures FOLDER`. Needs Debian's Chromium."""
 
 import subprocess
 import sys
@@ -17,7 +17,7 @@ LONGEST_MS = 300_000.0
 
 
 def main(folder: Path) -> None:
-    """Draw the page before anything is added, and after."""
+    """Draw the page after an effect was added."""
     expect.set_options(timeout=LONGEST_MS)
     with tempfile.TemporaryDirectory() as case, sync_playwright() as playwright:
         seal(Path(case, "hidden"), hide(SEED, duration_s=DURATION_S))
@@ -48,7 +48,11 @@ def _walk(page: Page, folder: Path) -> None:
     expect(page.get_by_test_id("journal-step")).to_be_visible()
     page.get_by_role("img", name="how the error fell").locator(".trace").first.wait_for()
     page.evaluate("scrollTo(0, 0)")
-    page.get_by_test_id("compared").locator("..").screenshot(path=folder / "workbench_page.png")
+    page.screenshot(path=folder / "workbench_page.png", full_page=True)
+    page.emulate_media(color_scheme="dark")
+    page.reload()
+    page.get_by_role("img", name="how the error fell").locator(".trace").first.wait_for()
+    page.screenshot(path=folder / "workbench_page_dark.png", full_page=True)
 
 
 if __name__ == "__main__":

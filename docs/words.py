@@ -22,7 +22,9 @@ from docs.long_sentences import long_sentences
 ROOT = Path(__file__).parents[1]
 FLOORS = ("config", "signals", "webpage", "fieldbus", "drivers", "sim", "positioner", "northbound", "workbench")
 STORED = Path(__file__).with_name("words.json")
-UNITS = re.compile(r"_(S|MS|US|NS|M|MM|UM|PA|KPA|BAR|N|HZ|PCT|PERCENT|DEG|MB|BYTES|WORDS|PER_\w+|M_PER_S)$")
+UNITS = re.compile(
+    r"_(S|MS|US|NS|M|MM|UM|PA|KPA|BAR|N|HZ|PCT|PERCENT|DEG|MB|BYTES|BITS|WORDS|PX|BAUD|DAYS|PER_\w+|M_PER_S)$"
+)
 IRREGULAR = frozenset(
     (
         *("begun", "borne", "bound", "broken", "brought", "built", "chosen", "come", "done", "drawn", "driven", "fed"),

@@ -4,7 +4,7 @@ from typing import Protocol
 
 from drivers.boundary import Capabilities, NoConnection, Reading, Refused
 
-ILLEGAL_VALUE = 3
+ILLEGAL_VALUE = 3  # Modbus exception 3
 
 
 class Plant(Protocol):

@@ -20,7 +20,7 @@ from fieldbus.modbus.exception_codes import EXCEPTION
 from fieldbus.modbus.rtu import ECHO, framed, is_whole
 from fieldbus.modbus.serial_line import SerialLine
 
-EXCEPTION_FRAME = 5
+EXCEPTION_FRAME = 5  # bytes: unit, function, code, check sum
 READS = (3, 4)
 """Functions whose reply is never the request itself."""
 ROUND_FRAME = 3

@@ -17,7 +17,7 @@ PEM = ("AUTHORITY.pem", "CERTIFICATE.pem", "KEY")
 
 def add_certificates(parser: argparse.ArgumentParser) -> None:
     """Declare the options that say by which certificates daemons are read and written."""
-    parser.add_argument("--tls", nargs=3, type=Path, metavar=PEM, help="read with this observer's certificate")
+    parser.add_argument("--tls", nargs=3, type=Path, metavar=PEM, help="read with this certificate of role observer")
     parser.add_argument(
         "--write-tls",
         nargs=2,
@@ -25,7 +25,7 @@ def add_certificates(parser: argparse.ArgumentParser) -> None:
         action="append",
         default=[],
         metavar=PEM[1:],
-        help="write with this certificate, as the role that it names; once for each role",
+        help="write with this certificate, of role operator or engineer; once for each role",
     )
 
 

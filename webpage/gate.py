@@ -27,7 +27,7 @@ Application = Callable[[Message, Receive, Send], Awaitable[None]]
 KEY = "key"
 """In the address."""
 SIGN_IN = "/sign-in"
-LONGEST_FORM = 4096
+LONGEST_FORM = 4096  # bytes of a sign-in form
 POLICY = (
     "default-src 'self'; script-src 'self' 'unsafe-inline' 'unsafe-eval'; style-src 'self' 'unsafe-inline'; "
     "img-src 'self' data: blob:; font-src 'self' data:; connect-src 'self' ws: wss:; frame-ancestors 'none'; "

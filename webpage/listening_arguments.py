@@ -6,14 +6,16 @@ from typing import TYPE_CHECKING
 if TYPE_CHECKING:
     from webpage.server import Listening
 
-MOST_PORT = 65535
+MOST_PORT = 65535  # 16 bits
 
 
 def add_listening(parser: argparse.ArgumentParser, port: int | None = None) -> None:
     """Declare where it listens; without a port of its own, at one that is free."""
-    parser.add_argument("--listen-host", default="127.0.0.1", help="where it listens (127.0.0.1: this machine alone)")
-    said = "8765, or another free one" if port is None else str(port)
-    parser.add_argument("--listen-port", type=int, default=port, metavar="N", help=f"at which port ({said})")
+    parser.add_argument(
+        "--listen-host", default="127.0.0.1", help="address to listen on (127.0.0.1, this machine alone)"
+    )
+    said = "8765, or a free one" if port is None else str(port)
+    parser.add_argument("--listen-port", type=int, default=port, metavar="N", help=f"port to listen on ({said})")
 
 
 def listening(arguments: argparse.Namespace) -> "Listening":

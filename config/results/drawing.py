@@ -19,7 +19,7 @@ if TYPE_CHECKING:
 
 MEASURED, MODEL, BETTER, QUIET, FAINT = "#1f2a37", "#d9622b", "#1b7f79", "#5b6675", "#9aa4b1"
 """Colours: what was measured, a model, what is valid or chosen, what stands beside it, what was refused."""
-WIDE, ROW = 10.0, 0.26
+WIDTH_INCHES, ROW_INCHES = 10.0, 0.26
 TICKS = (1.0, 2.0, 5.0)
 """Of a decade."""
 
@@ -31,7 +31,7 @@ def panels(heights: Sequence[float]) -> "tuple[Figure, Sequence[Axes]]":
         len(heights),
         sharex=True,
         squeeze=False,
-        figsize=(WIDE, sum(heights)),
+        figsize=(WIDTH_INCHES, sum(heights)),
         height_ratios=heights,
         layout="constrained",
     )
@@ -59,7 +59,7 @@ class Interval:
 
 def intervals(shown: Sequence[Interval], label: str) -> "tuple[Figure, Axes]":
     """Draw named values with their intervals, the first on top; what is infinite reaches the edge."""
-    figure, (axes,) = panels([0.9 + ROW * len(shown)])
+    figure, (axes,) = panels([0.9 + ROW_INCHES * len(shown)])
     finite = [end for each in shown for end in (each.low, each.high) if np.isfinite(end)]
     low, high = (min(finite), max(finite)) if finite else (0.0, 1.0)
     margin = 0.1 * (high - low) or 1.0
@@ -86,7 +86,7 @@ def race(errors: Mapping[str, float], chosen: Collection[str], marks: Mapping[st
     drawn = [(name, error) for name, error in errors.items() if np.isfinite(error) and error > 0.0]
     ordered = sorted(drawn, key=lambda each: -each[1])
     names = [name for name, _ in ordered]
-    figure, (axes,) = panels([1.1 + ROW * len(names)])
+    figure, (axes,) = panels([1.1 + ROW_INCHES * len(names)])
     colours = [BETTER if name in chosen else FAINT for name in names]
     axes.scatter([error for _, error in ordered], names, color=colours, zorder=3)
     for (name, value), style in zip(marks.items(), (":", "--"), strict=False):

@@ -20,8 +20,8 @@ if TYPE_CHECKING:
 
     from config.results.block import Block
 
-LONGEST_REPR = 240
-LONGEST_VALUE = 40
+LONGEST_REPR = 240  # characters of one line
+LONGEST_VALUE = 40  # characters of one field in it
 FEW_ITEMS = 3
 """Items of a series that are shown one by one."""
 
@@ -35,7 +35,7 @@ class Brief:
     __slots__ = ()
 
     def __repr__(self) -> str:
-        shown = ", ".join(f"{each.name}={_shown(getattr(self, each.name))}" for each in fields(self))  # type: ignore[arg-type]
+        shown = ", ".join(f"{each.name}={_show_value(getattr(self, each.name))}" for each in fields(self))  # type: ignore[arg-type]
         return f"{type(self).__name__}({_cut(shown, LONGEST_REPR)})"
 
 
@@ -85,7 +85,7 @@ class Result(ABC):
         return f"<{type(self).__name__}: {_cut(str(self.blocks()[0]), LONGEST_REPR)}>"
 
 
-def _shown(value: object) -> str:
+def _show_value(value: object) -> str:
     if isinstance(value, np.ndarray):
         return f"{value.dtype}[{', '.join(map(str, value.shape))}]"
     if isinstance(value, float):

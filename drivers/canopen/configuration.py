@@ -19,8 +19,8 @@ from drivers.canopen.pdo import PdoExchange
 from drivers.canopen.sdo import HEARTBEAT_MS, NO_SUCH_OBJECT, SdoTransfers, Setting
 from drivers.canopen.watcher import NodeWatcher
 
-SYNC, CONSUMED_HEARTBEATS = 0x1005, 0x1016
-DEFAULT_SYNC_ID = 0x80
+SYNC, CONSUMED_HEARTBEATS = 0x1005, 0x1016  # objects of CiA 301
+DEFAULT_SYNC_ID = 0x80  # CiA 301
 
 
 class NodeConfiguration:

@@ -33,7 +33,7 @@ from drivers.canopen.sdo import ILLEGAL_VALUE, SdoTransfers, Setting, device_she
 from drivers.canopen.watcher import NodeWatcher
 from fieldbus.canopen.objects import HOLDING, LOCAL, STATE_BITS, NodeState, inactive_because
 
-START, ENTER_PRE_OPERATIONAL = 1, 128
+START, ENTER_PRE_OPERATIONAL = 1, 128  # NMT commands of CiA 301
 OPERATIONAL = bytes((5,))
 
 

@@ -20,8 +20,14 @@ from fieldbus.canopen.python_can import can
 
 log = logging.getLogger(__package__)
 
-NMT, EMERGENCY, SDO_ANSWER, SDO_REQUEST, HEARTBEAT = 0x000, 0x080, 0x580, 0x600, 0x700
-WHOLE_ID = 0x7FF
+NMT, EMERGENCY, SDO_ANSWER, SDO_REQUEST, HEARTBEAT = (
+    0x000,
+    0x080,
+    0x580,
+    0x600,
+    0x700,
+)  # CiA 301; the node's number is added
+WHOLE_ID = 0x7FF  # all 11 bits
 CAN_ERROR_BUS_OFF = 0x40
 """Of an error frame's id, as SocketCAN has them."""
 

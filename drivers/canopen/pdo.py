@@ -40,7 +40,7 @@ from fieldbus.canopen.python_can import can
 
 RPDO, TPDO = 0x1400, 0x1800
 """First communication records."""
-RPDO_ID, TPDO_ID = 0x200, 0x180
+RPDO_ID, TPDO_ID = 0x200, 0x180  # first PDO's CAN identifiers, CiA 301
 FIRST_TIMERS = 3
 """Event timers within which TPDOs that come by themselves must all have come once."""
 

@@ -30,16 +30,16 @@ from fieldbus.canopen.eds import read_eds
 
 ILLEGAL_VALUE = 3
 """The code of `Refused` for a value that the device cannot be told, as Modbus has it."""
-IDENTITY, VENDOR, PRODUCT = 0x1018, 1, 2
+IDENTITY, VENDOR, PRODUCT = 0x1018, 1, 2  # object and its parts, CiA 301
 HEARTBEAT_MS = 0x1017
 LONGEST_LISTENING_S = 1.0
 """For a heartbeat, however short its period: one that comes late is of a node that may well be running."""
-NO_SUCH_OBJECT = 0x06020000
+NO_SUCH_OBJECT = 0x06020000  # abort code of CiA 301
 RESERVED = range(0x0400, 0x1000)
 """Indices at which CiA 301 lets no node have an object."""
 UNNAMED = bytes(3)
 """What some nodes say for the object that they refuse."""
-DOWNLOAD_REQUEST, UPLOAD_REQUEST, ABORT = 0x20, 0x40, 0x80
+DOWNLOAD_REQUEST, UPLOAD_REQUEST, ABORT = 0x20, 0x40, 0x80  # command bytes of CiA 301
 SPECIFIER = 0xE0
 """The bits of the first byte that say which kind of request or answer it is."""
 ANSWERS = {DOWNLOAD_REQUEST: 0x60, UPLOAD_REQUEST: 0x40, 0x00: 0x20, 0x60: 0x00}

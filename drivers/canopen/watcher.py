@@ -20,9 +20,9 @@ from drivers.canopen.events import NodeEvent
 from drivers.canopen.node_bus import EMERGENCY, HEARTBEAT, NodeBus
 from fieldbus.canopen.python_can import can
 
-OPERATIONAL, PRE_OPERATIONAL, BOOT_UP = 5, 127, 0
+OPERATIONAL, PRE_OPERATIONAL, BOOT_UP = 5, 127, 0  # states in a heartbeat, CiA 301
 NMT_STATES = {0: "booting", 4: "STOPPED", 5: "OPERATIONAL", 127: "PRE-OPERATIONAL"}
-COMMAND_OUT_OF_RANGE = 0x6320
+COMMAND_OUT_OF_RANGE = 0x6320  # emergency code, CiA 301
 EMERGENCIES = {
     0x1000: "generic error",
     0x2000: "current",
@@ -52,7 +52,7 @@ EMERGENCIES = {
 """Error codes of CiA 301; a class ends in 00 or 000."""
 OF_THE_DEVICE = (0x2000, 0x3000, 0x5000, 0x6000, 0x7000)
 """Classes by their first digit."""
-OF_A_PARAMETER = 0x6300
+OF_A_PARAMETER = 0x6300  # class of emergency codes, CiA 301
 
 
 def cause_of(code: int) -> str:

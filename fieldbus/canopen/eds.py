@@ -31,12 +31,12 @@ DATA_TYPE: dict[WireType, int] = {
     "float64": 0x11,
     "uint64": 0x1B,
 }
-INTEGER8, UNSIGNED8, UNSIGNED16, UNSIGNED32, VISIBLE_STRING = 0x02, 0x05, 0x06, 0x07, 0x09
+INTEGER8, UNSIGNED8, UNSIGNED16, UNSIGNED32, VISIBLE_STRING = 0x02, 0x05, 0x06, 0x07, 0x09  # data types of CiA 301
 BYTES = {INTEGER8: 1, UNSIGNED8: 1, UNSIGNED16: 2, UNSIGNED32: 4}
 BYTES |= {code: 2 * Format(wire).words for wire, code in DATA_TYPE.items()}
-VAR, ARRAY, RECORD = 7, 8, 9
+VAR, ARRAY, RECORD = 7, 8, 9  # object types of CiA 301
 
-VENDOR, PRODUCT, REVISION = 0, 0x49505054, 0x00010000
+VENDOR_NUMBER, PRODUCT_NUMBER, REVISION = 0, 0x49505054, 0x00010000
 """CiA has given the project no vendor number; the product is "IPPT", an I/P with position transmitter."""
 NAME = "I/P with position transmitter"
 
@@ -118,8 +118,8 @@ def _head() -> Iterator[str]:
     yield from ("[FileInfo]", "FileName=positioner.eds", "FileVersion=1", "FileRevision=0", "EDSVersion=4.0")
     yield f"Description={NAME}"
     yield from ("CreationTime=12:00AM", "CreationDate=01-01-2026", "CreatedBy=positioner", "")
-    yield from ("[DeviceInfo]", "VendorName=positioner", f"VendorNumber=0x{VENDOR:08X}", f"ProductName={NAME}")
-    yield from (f"ProductNumber=0x{PRODUCT:08X}", f"RevisionNumber=0x{REVISION:08X}", "OrderCode=IPPT")
+    yield from ("[DeviceInfo]", "VendorName=positioner", f"VendorNumber=0x{VENDOR_NUMBER:08X}", f"ProductName={NAME}")
+    yield from (f"ProductNumber=0x{PRODUCT_NUMBER:08X}", f"RevisionNumber=0x{REVISION:08X}", "OrderCode=IPPT")
     yield from (f"BaudRate_{rate}=1" for rate in (10, 20, 50, 125, 250, 500, 800, 1000))
     yield from ("SimpleBootUpMaster=0", "SimpleBootUpSlave=1", "Granularity=8", "DynamicChannelsSupported=0")
     yield from ("GroupMessaging=0", "NrOfRXPDO=1", f"NrOfTXPDO={MOST_PDOS}", "LSS_Supported=0", "")
@@ -138,8 +138,8 @@ def _communication() -> dict[int, Object]:
             "Identity object",
             RECORD,
             (
-                Variable("Vendor-ID", UNSIGNED32, "ro", f"0x{VENDOR:08X}"),
-                Variable("Product code", UNSIGNED32, "ro", f"0x{PRODUCT:08X}"),
+                Variable("Vendor-ID", UNSIGNED32, "ro", f"0x{VENDOR_NUMBER:08X}"),
+                Variable("Product code", UNSIGNED32, "ro", f"0x{PRODUCT_NUMBER:08X}"),
                 Variable("Revision number", UNSIGNED32, "ro", f"0x{REVISION:08X}"),
                 Variable("Serial number", UNSIGNED32, "ro"),
             ),

@@ -2,9 +2,10 @@
 
     can.Bus(interface="loopback", channel="29500")
 
-Every end is a UDP socket on 127.0.0.1, bound to the first free of the bus's `ENDS` ports from `channel` on. A frame
-goes to each other end as a datagram of its own, never back to its sender. A newcomer asks the system which of the
-ports are taken, says hello to each, and may send at once; by the hello the others know it, before its first frame.
+Every end is a UDP socket on 127.0.0.1, bound to the first free of the bus's `CHANNEL_ENDS` ports from `channel` on. A
+frame goes to each other end as a datagram of its own, never back to its sender. A newcomer asks the system which of
+the ports are taken, says hello to each, and may send at once; by the hello the others know it, before its first
+frame.
 
     hello   the arbitration ids wanted, as (id, mask) pairs, none: all
     frame   arbitration id with flags, up to 8 data bytes
@@ -39,13 +40,13 @@ from fieldbus.canopen.python_can import can
 log = logging.getLogger(__name__)
 
 HOST = "127.0.0.1"
-ENDS = 16
+CHANNEL_ENDS = 16
 """Ends on one bus; so many ports from its channel on belong to it."""
-WINDOW, ACK_EVERY = 32, 16
+WINDOW, ACK_EVERY = 32, 16  # unread frames that a sender waits for; how often they are acknowledged
 DEAF_S = 0.05
-BLOCK_S = 0.005
+WAIT_IN_KERNEL_S = 0.005
 """The longest wait in the kernel; a reader waits again and again."""
-LOOK_S = 0.001
+BUS_LOOK_S = 0.001
 """A sender whose end has not begun to read for as long looks whether a hello is waiting."""
 RECEIVE_BUFFER_BYTES = 1 << 20
 FIRST_CHANNEL, LAST_CHANNEL = 20000, 32000
@@ -59,7 +60,7 @@ FILTER = struct.Struct("<II")
 TIMEOUT = struct.Struct("@ll")
 MAGIC = b"pCAN"
 HELLO, DATA, ACK, BYE, WAKE = range(5)
-LONGEST = HEAD.size + ENDS * FILTER.size
+LONGEST = HEAD.size + CHANNEL_ENDS * FILTER.size
 EXTENDED, REMOTE, ERROR = 1 << 31, 1 << 30, 1 << 29
 ID_BITS = ERROR - 1
 
@@ -113,7 +114,7 @@ class LoopbackBus(can.BusABC):
         self._socket, self.port = self._bound()
         self._end = self.port - self._base
         self.channel_info = f"loopback {self._base}"
-        for port in range(self._base, self._base + ENDS):
+        for port in range(self._base, self._base + CHANNEL_ENDS):
             if port != self.port and _taken(port):
                 self._peers[port] = _Peer(port)
         super().__init__(channel, can_filters, **kwargs)
@@ -132,7 +133,7 @@ class LoopbackBus(can.BusABC):
         data = bytes(msg.data)
         with self._sending:
             now_s = time.monotonic()
-            if now_s - self._looked_s > LOOK_S:
+            if now_s - self._looked_s > BUS_LOOK_S:
                 self._looked_s = now_s
                 self._take_all()
             for peer in self._peers.values():
@@ -176,7 +177,7 @@ class LoopbackBus(can.BusABC):
         end_s = None if timeout is None else now_s + timeout
         while True:
             with self._taking:
-                wait_s = BLOCK_S if end_s is None else min(BLOCK_S, end_s - time.monotonic())
+                wait_s = WAIT_IN_KERNEL_S if end_s is None else min(WAIT_IN_KERNEL_S, end_s - time.monotonic())
                 if not frames and not self._take(0.0 if wait_s <= 0 else wait_s) and wait_s <= 0:
                     return None, False
                 if frames:
@@ -186,7 +187,7 @@ class LoopbackBus(can.BusABC):
     def _apply_filters(self, filters: Any) -> None:
         """Tell the others what is wanted here; too many filters are applied here alone."""
         pairs = [FILTER.pack(each["can_id"], each["can_mask"]) for each in filters or ()]
-        wanted = b"".join(pairs) if len(pairs) <= ENDS else b""
+        wanted = b"".join(pairs) if len(pairs) <= CHANNEL_ENDS else b""
         with self._sending:
             for peer in self._peers.values():
                 self._tell(peer, HELLO, wanted)
@@ -195,8 +196,8 @@ class LoopbackBus(can.BusABC):
         """Return a socket on the first free port of the bus."""
         end = socket.socket(socket.AF_INET, socket.SOCK_DGRAM)
         end.setsockopt(socket.SOL_SOCKET, socket.SO_RCVBUF, RECEIVE_BUFFER_BYTES)
-        end.setsockopt(socket.SOL_SOCKET, socket.SO_RCVTIMEO, TIMEOUT.pack(0, round(1e6 * BLOCK_S)))
-        for port in range(self._base, self._base + ENDS):
+        end.setsockopt(socket.SOL_SOCKET, socket.SO_RCVTIMEO, TIMEOUT.pack(0, round(1e6 * WAIT_IN_KERNEL_S)))
+        for port in range(self._base, self._base + CHANNEL_ENDS):
             try:
                 end.bind((HOST, port))
             except OSError as error:
@@ -205,7 +206,7 @@ class LoopbackBus(can.BusABC):
                 continue
             return end, port
         end.close()
-        raise can.CanInitializationError(f"loopback {self._base}: all of its {ENDS} ends are taken")
+        raise can.CanInitializationError(f"loopback {self._base}: all of its {CHANNEL_ENDS} ends are taken")
 
     def _tell(self, peer: _Peer, kind: int, body: bytes = b"") -> None:
         peer.told = peer.received
@@ -224,7 +225,7 @@ class LoopbackBus(can.BusABC):
         while not self._taking.acquire(blocking=False):
             with suppress(OSError):  # closed meanwhile: the reader ends, and lets go
                 self._socket.sendto(HEAD.pack(MAGIC, WAKE, self._end, self._wakes, 0), (HOST, self.port))
-            if self._woken.wait(BLOCK_S):
+            if self._woken.wait(WAIT_IN_KERNEL_S):
                 return
         try:
             while self._take(0.0):
@@ -235,7 +236,7 @@ class LoopbackBus(can.BusABC):
     def _take(self, wait_s: float) -> bool:
         """Take one datagram from the socket; return whether there was one. The caller holds `_taking`."""
         flags = 0
-        if wait_s < BLOCK_S:
+        if wait_s < WAIT_IN_KERNEL_S:
             flags = socket.MSG_DONTWAIT
             if wait_s:
                 self._await(wait_s)
@@ -252,7 +253,7 @@ class LoopbackBus(can.BusABC):
             elif end == self._end:
                 if magic == MAGIC and kind == WAKE and number == self._wakes:
                     self._woken.set()
-            elif magic == MAGIC and end < ENDS:
+            elif magic == MAGIC and end < CHANNEL_ENDS:
                 port = self._base + end
                 self._handle(self._peers.get(port) or self._newcomer(port), kind, number, taken, datagram)
         return True
@@ -335,18 +336,20 @@ def free_channel() -> str:
     Raises:
         CanInitializationError: there is none.
     """
-    channels = list(range(FIRST_CHANNEL, LAST_CHANNEL, ENDS))
+    channels = list(range(FIRST_CHANNEL, LAST_CHANNEL, CHANNEL_ENDS))
     random.shuffle(channels)
     for base in channels:
-        if not any(_taken(port) for port in range(base, base + ENDS)):
+        if not any(_taken(port) for port in range(base, base + CHANNEL_ENDS)):
             return str(base)
     raise can.CanInitializationError("loopback: no free channel")
 
 
 def _base(channel: Any) -> int:
     text = str(channel)
-    if not text.isdecimal() or not 1024 <= int(text) <= 65536 - ENDS:
-        raise can.CanInitializationError(f"loopback: channel {text!r} is not a port from 1024 to {65536 - ENDS}")
+    if not text.isdecimal() or not 1024 <= int(text) <= 65536 - CHANNEL_ENDS:
+        raise can.CanInitializationError(
+            f"loopback: channel {text!r} is not a port from 1024 to {65536 - CHANNEL_ENDS}"
+        )
     return int(text)
 
 

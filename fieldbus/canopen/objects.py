@@ -10,7 +10,7 @@ Control and status words are those of CiA 408 (proportional valves), with three 
 from collections.abc import Mapping
 from enum import IntEnum, IntFlag
 
-DEVICE_MODE = 0x6042
+DEVICE_MODE = 0x6042  # object of CiA 408
 PDO_BYTES = 8
 MOST_PDOS = 4
 """By the predefined connection set, of each direction."""
@@ -41,8 +41,8 @@ class NodeState(IntEnum):
 
 HOLDING = (NodeState.HOLD, NodeState.FAULT_HOLD)
 """States in which a node goes on with what it did, whatever its set point."""
-STATE_BITS = 0b1111
-NO_FAULT = 0b1000
+STATE_BITS = 0b1111  # of the status word, CiA 408
+NO_FAULT = 0b1000  # bit 3: no fault, CiA 408
 LOCAL = 1 << 4
 """Of the status word: it is operated locally and ignores the bus."""
 

@@ -18,9 +18,9 @@ from threading import Lock
 
 Network = IPv4Network | IPv6Network
 
-MOST_CLIENTS = 64
+MOST_CLIENTS = 64  # a DCS, pages and metrics need less than ten
 UNUSED_S = 60.0
-MOST_HANDSHAKES, HANDSHAKES_PER_HOST = 128, 32
+MOST_HANDSHAKES, HANDSHAKES_PER_HOST = 128, 32  # twice the clients: each may come back while it is missed
 BURST_S = 0.2
 MOST_HOSTS = 256
 """Whose requests are counted; beyond, the one counted for longest is forgotten."""

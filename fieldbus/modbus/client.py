@@ -26,7 +26,7 @@ from fieldbus.modbus.host_address import HostAddress, connected
 from fieldbus.modbus.pdu import encoded
 from fieldbus.modbus.tls import client_context, failure_reason
 
-CHUNK = 512
+REPLY_PIECE_BYTES = 512
 """More than a frame has."""
 CLOSED = "the connection is closed"
 
@@ -219,7 +219,7 @@ class ModbusClient:
 
 
 def _some(line: socket.socket) -> bytes:
-    data = line.recv(CHUNK)
+    data = line.recv(REPLY_PIECE_BYTES)
     if not data:
         raise ConnectionResetError
     return data

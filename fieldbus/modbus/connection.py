@@ -22,7 +22,7 @@ from typing import Protocol
 HEADER = struct.Struct(">HHHB")
 SHORTEST, LONGEST_FRAME_BYTES = 2, 254
 """What the length of a frame can be."""
-CHUNK = 4096
+REQUEST_PIECE_BYTES = 4096  # bytes read at once: sixteen of the largest frames
 SEND_TIMEOUT_S = 1.0
 
 
@@ -83,7 +83,7 @@ class Connection(BaseRequestHandler):
         since_s = time.monotonic()
         while True:
             try:
-                return self.request.recv(CHUNK)
+                return self.request.recv(REQUEST_PIECE_BYTES)
             except TimeoutError:  # that one is for sending: how long a client may be silent is another matter
                 if 0.0 < self.server.idle_s < time.monotonic() - since_s:
                     return b""

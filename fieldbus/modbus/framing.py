@@ -20,7 +20,7 @@ from fieldbus.modbus.rtu import LEAST_FRAME, framed, is_whole
 
 LENGTH_ENDS = 6
 """Bytes of a frame up to its length, which counts those behind it."""
-LAST_TRANSACTION = 0xFFFF
+LAST_TRANSACTION = 0xFFFF  # 16 bits
 ANSWERED = (3, 4, 6, 16, 23)
 """Functions that are asked for."""
 

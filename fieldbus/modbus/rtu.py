@@ -14,10 +14,10 @@ Source: MODBUS over Serial Line Specification and Implementation Guide V1.02, se
 from pymodbus.framer import FramerRTU
 from pymodbus.pdu import DecodePDU
 
-BROADCAST = 0
-LARGEST_FRAME = 256
-LEAST_FRAME = 4
-NO_TRANSACTION = 0
+BROADCAST = 0  # unit that all devices obey and none answers
+LARGEST_FRAME = 256  # bytes, Modbus over serial line
+LEAST_FRAME = 4  # bytes: unit, function, check sum
+NO_TRANSACTION = 0  # a serial line has no numbers of transactions
 ECHO = b"\x08\0\0"
 """Function 8, sub-function 0: the device answers with the request itself. Serial lines only."""
 

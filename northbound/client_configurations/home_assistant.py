@@ -17,7 +17,7 @@ WATCHED = (
     *("ne107", "ne107_cause", "friction", "friction_ratio", "travel", "reversals", "stiction_index"),
     *("identifications", "event_number", "event"),
 )
-EVERY_S = 10
+SCAN_EVERY_S = 10
 DECIMALS = 6
 """It rounds to whole numbers unless told otherwise."""
 
@@ -55,7 +55,7 @@ def _sensors(file: "DaemonFile") -> Iterator[str]:
             yield f"        unit_of_measurement: {json.dumps(register.unit)}"
         if register.type == "float32":
             yield f"        precision: {DECIMALS}"
-        yield f"        scan_interval: {EVERY_S}"
+        yield f"        scan_interval: {SCAN_EVERY_S}"
 
 
 def _identity(text: str) -> str:

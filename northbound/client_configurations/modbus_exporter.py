@@ -11,7 +11,7 @@ from typing import TYPE_CHECKING
 if TYPE_CHECKING:
     from config.daemon_file import DaemonFile
 
-INPUT_REGISTERS = 300_000
+INPUT_REGISTERS = 300_000  # its prefix of input registers
 MODULE = "positioner"
 
 

@@ -15,7 +15,7 @@ if TYPE_CHECKING:
     from config.daemon_file import DaemonFile
     from config.registers import Register
 
-EVERY_S = 1
+REQUEST_EVERY_S = 1
 ANSWER_WITHIN_MS = 200
 ROW_PIXELS = 60
 TAB = "positioner"
@@ -72,7 +72,7 @@ def _row(row: int, file: "DaemonFile", registers: "Sequence[Register]") -> list[
     where, valve = file.supervisory, json.dumps(file.valve.name)
     table = json.dumps([[each.name, each.address, each.type, each.format.words] for each in registers])
     kinds: list[tuple[str, str, dict[str, Any]]] = [
-        ("inject", "every second", {"props": [], "repeat": str(EVERY_S), "once": True, "onceDelay": 0.1}),
+        ("inject", "every second", {"props": [], "repeat": str(REQUEST_EVERY_S), "once": True, "onceDelay": 0.1}),
         ("function", "ask", {"func": ASK.format(unit=where.unit, blocks=json.dumps(_blocks(registers))), "outputs": 1}),
         (
             "tcp request",

@@ -6,15 +6,15 @@ from pathlib import Path
 from positioner.cli.parts.config_argument import add_config, config_files
 from webpage.listening_arguments import add_listening
 
-HELP = "serve the metrics of daemons and valves to Prometheus: /metrics over HTTP"
+HELP = "serve the metrics of running valves to Prometheus (HTTP, /metrics)"
 EXAMPLE = "positioner metrics daemon.toml --listen-port 9502"
 
 
 def add_arguments(parser: argparse.ArgumentParser) -> None:
     """Declare the command line."""
-    add_config(parser, many=True, text="a daemon's file: all its valves")
+    add_config(parser, many=True, text="a daemon's file, with all its valves")
     pem = ("AUTHORITY.pem", "CERTIFICATE.pem", "KEY")
-    parser.add_argument("--tls", nargs=3, type=Path, metavar=pem, help="read with this observer's certificate")
+    parser.add_argument("--tls", nargs=3, type=Path, metavar=pem, help="read with this certificate of role observer")
     add_listening(parser, 9502)
 
 

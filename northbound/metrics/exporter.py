@@ -17,7 +17,7 @@ from config.errors import InputError
 from northbound.metrics.scraped_valve import ScrapedValve
 from northbound.metrics.valve_metrics import SPACE, Gauge, Histogram, metrics
 
-MOST_AT_ONCE = 16
+MOST_SCRAPES = 16
 """Daemons read at the same time, so that those that do not answer hold up no scrape."""
 
 
@@ -32,7 +32,7 @@ class ValveCollector(Collector):
         """Return what each valve's daemon says now."""
         families: dict[str, Metric] = {}
         up = GaugeMetricFamily(f"{SPACE}_up", "1 if the valve's daemon answers", labels=["valve"])
-        with ThreadPoolExecutor(min(len(self._valves), MOST_AT_ONCE)) as readers:
+        with ThreadPoolExecutor(min(len(self._valves), MOST_SCRAPES)) as readers:
             for valve, values in zip(self._valves, readers.map(ScrapedValve.read, self._valves), strict=True):
                 up.add_metric([valve.name], float(values is not None))
                 self._say(valve)

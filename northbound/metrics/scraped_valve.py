@@ -8,7 +8,7 @@ from config.registers import BY_NAME
 from config.tls_table import Tls
 from positioner.dcs import Dcs
 
-REPLY_WITHIN_S = 1.0
+SCRAPE_WITHIN_S = 1.0
 
 
 class ScrapedValve:
@@ -24,7 +24,7 @@ class ScrapedValve:
         self.name = name
         self.problem = ""
         """Why the last reading failed; empty if it did not."""
-        self._dcs = Dcs(*where, timeout_s=REPLY_WITHIN_S, tls=tls)
+        self._dcs = Dcs(*where, timeout_s=SCRAPE_WITHIN_S, tls=tls)
         self._open = False
         self._lock = Lock()
 

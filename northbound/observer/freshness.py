@@ -3,7 +3,7 @@
 What a page shows is of now only while
 
     the last reading came within READ_WITHIN_S, and none has failed since,
-    the count of cycles moved within   limit_s = max(STANDS_AFTER_S, PERIODS T),
+    the count of cycles moved within   limit_s = max(STANDS_AFTER_S, STALE_PERIODS T),
     the age of the last good measurement is at most   limit_s   (else position and pressure alone are old),
 
 T, s, being the period of the daemon's loop. A daemon was started anew when its count fell, or, after the connection
@@ -18,7 +18,7 @@ from positioner.dcs import CYCLES_WRAP
 
 READ_WITHIN_S = 1.0
 STANDS_AFTER_S = 1.0
-PERIODS = 3
+STALE_PERIODS = 3
 """Periods of a slow loop after which one without news counts as standing."""
 
 
@@ -71,7 +71,7 @@ class FreshnessMemory:
 
 def news_within_s(period_s: float) -> float:
     """Return how long a loop of a period, s, may be without news; NaN is a period that is not known."""
-    return max(STANDS_AFTER_S, PERIODS * period_s) if math.isfinite(period_s) else STANDS_AFTER_S
+    return max(STANDS_AFTER_S, STALE_PERIODS * period_s) if math.isfinite(period_s) else STANDS_AFTER_S
 
 
 def after_reading(memory: FreshnessMemory, time_s: float, values: Mapping[str, float]) -> FreshnessMemory:
@@ -85,7 +85,7 @@ def after_reading(memory: FreshnessMemory, time_s: float, values: Mapping[str, f
     cycles = values.get("cycles")
     if cycles is None:
         return after
-    restarted = memory.cycles is not None and _restarted(memory, after.period_s, time_s, cycles)
+    restarted = memory.cycles is not None and _is_restarted(memory, after.period_s, time_s, cycles)
     if restarted or cycles != memory.cycles:
         after = replace(after, cycles=cycles, moved_s=time_s)
     return replace(after, restarts=memory.restarts + restarted)
@@ -113,7 +113,7 @@ def freshness(memory: FreshnessMemory, now_s: float) -> Freshness:
     return Freshness()
 
 
-def _restarted(memory: FreshnessMemory, period_s: float, time_s: float, cycles: float) -> bool:
+def _is_restarted(memory: FreshnessMemory, period_s: float, time_s: float, cycles: float) -> bool:
     assert memory.cycles is not None
     ahead = (cycles - memory.cycles) % CYCLES_WRAP
     fell = ahead >= CYCLES_WRAP // 2

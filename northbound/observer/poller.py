@@ -15,7 +15,7 @@ from northbound.observer.valve_view import ValveView
 from positioner.dcs import Dcs
 
 POLL_S = 0.05
-COUNTS_EVERY = 5
+COUNTS_EVERY = 5  # polls: counters change slowly
 REST_EVERY = 20
 """Polls from one to the next."""
 RETRY_S = 0.25

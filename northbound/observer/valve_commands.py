@@ -60,7 +60,7 @@ def _as_read(name: str, value: float) -> str:
     return f"{100 * value:.6g} %" if name == "reference" else f"{value:.6g}"
 
 
-def _confirmed(name: str, value: float, read: float) -> Confirmation:
+def _confirm(name: str, value: float, read: float) -> Confirmation:
     """Return what became of a write, by what reads back."""
     said = _as_read(name, read)
     if abs(read - value) <= SAME * max(1.0, abs(value)):
@@ -86,7 +86,7 @@ class ValveCommands:
         """Write a register; confirmed when it reads back so."""
 
         def written(dcs: Dcs) -> Confirmation:
-            return _confirmed(name, value, dcs.set_and_read_back(name, value))
+            return _confirm(name, value, dcs.set_and_read_back(name, value))
 
         return self._within_rights(role, (name,), written)
 
@@ -112,7 +112,7 @@ class ValveCommands:
                 return Confirmation(False, f"nothing was written: the reference is {now} by now, and was {then}")
             to_pu = seen_pu if goes else min(max(dcs.get("position_signal"), 0.0), 1.0)
             dcs.set_and_read_back("reference", to_pu)
-            return _confirmed("mode", Mode.AUTOMATIC, dcs.set_and_read_back("mode", Mode.AUTOMATIC))
+            return _confirm("mode", Mode.AUTOMATIC, dcs.set_and_read_back("mode", Mode.AUTOMATIC))
 
         return self._within_rights(role, ("reference", "mode"), written)
 
@@ -121,7 +121,7 @@ class ValveCommands:
 
         def written(dcs: Dcs) -> Confirmation:
             dcs.set_and_read_back("manual_pressure", pressure_pa)
-            return _confirmed("mode", Mode.MANUAL, dcs.set_and_read_back("mode", Mode.MANUAL))
+            return _confirm("mode", Mode.MANUAL, dcs.set_and_read_back("mode", Mode.MANUAL))
 
         if problem := register_named("manual_pressure").problem_with(pressure_pa):
             return Confirmation(False, problem)

@@ -32,7 +32,7 @@ TESTS: Mapping[str, tuple[str, ...]] = {
 """The commands, by what people call the tests."""
 KEPT_AS: Mapping[str, str] = {"": "no more than its trend", "as_found": "as found", "as_left": "as left"}
 COMMAND = (sys.executable, "-m", "positioner.cli")
-END_WITHIN_S = 10.0
+TEST_END_WITHIN_S = 10.0
 
 
 class ValveTests:
@@ -66,8 +66,8 @@ class ValveTests:
         if not self._under_way.acquire(blocking=False):
             return Confirmation(False, "a test is under way already")
         try:
-            with self._consented(role):
-                status, said = self._played([*TESTS[test], *self._words(role, kind)], show)
+            with self._consent_meanwhile(role):
+                status, said = self._play([*TESTS[test], *self._words(role, kind)], show)
         except (CommandFailed, InputError) as failed:
             return Confirmation(False, str(failed))
         finally:
@@ -92,7 +92,7 @@ class ValveTests:
     def end(self) -> None:
         """Break it off, and wait until the law has its command back."""
         self.break_off()
-        if self._under_way.acquire(timeout=END_WITHIN_S):
+        if self._under_way.acquire(timeout=TEST_END_WITHIN_S):
             self._under_way.release()
 
     def _which(self) -> list[str]:
@@ -104,7 +104,7 @@ class ValveTests:
         return [*self._which(), *(("--keep", kind) if kind else ()), *secured]
 
     @contextmanager
-    def _consented(self, role: Role) -> Iterator[None]:
+    def _consent_meanwhile(self, role: Role) -> Iterator[None]:
         """Consent for as long as the context lasts, or longer where somebody had consented before."""
         with self._place.connection(role) as dcs:
             if dcs.get("experiment_consent"):
@@ -117,7 +117,7 @@ class ValveTests:
             with self._place.connection(role) as dcs:
                 dcs.set("experiment_consent", 0)
 
-    def _played(self, words: Sequence[str], show: Callable[[str], None]) -> tuple[int, str]:
+    def _play(self, words: Sequence[str], show: Callable[[str], None]) -> tuple[int, str]:
         said = ""
         with subprocess.Popen(
             [*COMMAND, *words], stdout=subprocess.PIPE, stderr=subprocess.STDOUT, text=True, encoding="utf-8"

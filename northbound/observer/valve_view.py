@@ -23,13 +23,13 @@ FRICTION_KEPT = 43_200
 """A month of minutes."""
 FrictionRow = tuple[float, float, float]
 """Time, s, friction and its baseline, Pa."""
-MOST_EVENTS = 200
+MOST_EVENTS = 200  # newest that are kept
 
 WATCHED = {
     "mode": "mode",
     "fault": "fault",
     "experiment_state": "experiment",
-    "restored": "knowledge from before",
+    "restored": "restored knowledge",
 }
 """Codes whose change is an event, and what they are called."""
 HEALTH = frozenset(("ne107", "ne107_cause"))
@@ -174,7 +174,7 @@ class ValveView:
 
     def _note_connection(self, time_s: float, memory: FreshnessMemory) -> None:
         if memory.restarts > self._memory.restarts:
-            self._events.appendleft(SeenEvent(time_s, "the daemon was started anew", True))
+            self._events.appendleft(SeenEvent(time_s, "the daemon has restarted", True))
         elif self._memory.is_away:
             self._events.appendleft(SeenEvent(time_s, "connected", True))
 

@@ -31,11 +31,12 @@ DI = "http://opcfoundation.org/UA/DI/"
 PADIM = "http://opcfoundation.org/UA/PADIM/"
 OURS = "urn:positioner:valves"
 DEVICE_SET, PADIM_TYPE, SIGNAL_SET_TYPE, CONTROL_SIGNAL_TYPE, ANALOG_SIGNAL_TYPE = 5001, 1009, 1021, 1023, 1022
-EXECUTION_MODE = 1158
+"""Node numbers of the nodesets."""
+EXECUTION_MODE = 1158  # node number of the nodeset
 UNECE = "http://www.opcfoundation.org/UA/units/un/cefact"
 UNITS = {"%": "P1", "Pa": "PAL", "s": "SEC", "1": "C62", "1/s": "C97", "Pa/m": "H42", "m/s^2": "MSK"}
 """UN/ECE's codes; what has none is named as it is."""
-RANGE_PA = (0.0, 420e3)
+SIGNAL_RANGE_PA = (0.0, 420e3)
 IDENTIFY, BREAK_OFF, ACKNOWLEDGE, ADJUST = "Identify", "BreakOff", "Acknowledge", f"{POSITION}.AutoAdjustPositioner"
 
 
@@ -128,7 +129,7 @@ async def _add_signals(server: Server, signals: Node, valve: ValveSpace, place: 
         tag = f"{place.name}.{name}" if path == PRESSURE else place.name
         await server.get_node(valve.node_id(f"{path}.SignalTag")).write_value(tag)
     await _scale(server, valve, SIGNAL, "%", (0.0, 100.0))
-    await _scale(server, valve, PRESSURE_SIGNAL, "Pa", place.range_pa or RANGE_PA)
+    await _scale(server, valve, PRESSURE_SIGNAL, "Pa", place.range_pa or SIGNAL_RANGE_PA)
     await server.get_node(valve.node_id(PRESSURE_SIGNAL)).write_attribute(
         ua.AttributeIds.DataType, ua.DataValue(ua.Variant(ua.NodeId(ua.ObjectIds.Double), ua.VariantType.NodeId))
     )

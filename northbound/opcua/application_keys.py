@@ -26,7 +26,7 @@ OWN_DAYS = 1825
 LEAST_BITS = 2048
 MOST_REJECTED = 20
 """Files; further ones are turned away without a trace on the disk."""
-OWN_ALONE = 0o600
+OWN_ALONE = 0o600  # the owner reads and writes
 
 
 class Refusal(NamedTuple):

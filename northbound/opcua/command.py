@@ -7,22 +7,27 @@ from northbound.served_valves import add_certificates, certificates, places_in, 
 from positioner.cli.parts.config_argument import add_config, config_files
 from webpage.listening_arguments import add_listening, require_port
 
-HELP = "serve running valves to OPC UA clients: signed and encrypted, users by role, the history of the daemon"
+HELP = "serve running valves to OPC UA clients, signed and encrypted, with users by role"
 EXAMPLE = "positioner opcua daemon.toml --users users.json --keys opcua-keys"
 
 
 def add_arguments(parser: argparse.ArgumentParser) -> None:
     """Declare the command line."""
-    add_config(parser, many=True, text="a daemon's file: all its valves")
+    add_config(parser, many=True, text="a daemon's file, with all its valves")
     add_certificates(parser)
-    parser.add_argument("--users", type=Path, metavar="FILE", help="the passwords of observer, operator and engineer")
+    parser.add_argument(
+        "--users", type=Path, metavar="FILE", help="file with the passwords of observer, operator and engineer"
+    )
     parser.add_argument(
         "--set-password",
         choices=("observer", "operator", "engineer"),
-        help="ask for this user's password, keep it in --users, end",
+        help="ask for the password of this user, write it to --users, and end",
     )
     parser.add_argument(
-        "--keys", type=Path, metavar="FOLDER", help="this server's certificate, and those of the clients it trusts"
+        "--keys",
+        type=Path,
+        metavar="FOLDER",
+        help="folder with the certificate of this server and those of trusted clients",
     )
     add_listening(parser, 4840)
 

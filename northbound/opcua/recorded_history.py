@@ -114,13 +114,13 @@ def _points(recorded: Recorded, since_s: float | None) -> list[tuple[float, floa
         if recorded.node in BY_HOUR:
             column = BY_HOUR[recorded.node]
             hours = history.rows(HealthHour, recorded.valve, since_s)
-            return sorted((float(each.hour_s), _served(recorded.node, getattr(each, column))) for _, each in hours)
+            return sorted((float(each.hour_s), _as_served(recorded.node, getattr(each, column))) for _, each in hours)
         column = BY_IDENTIFICATION[recorded.node]
         found = history.rows(Identification, recorded.valve, since_s)
         return sorted((each.time_s, getattr(each, column)) for _, each in found)
 
 
-def _served(node: str, value: float) -> float:
+def _as_served(node: str, value: float) -> float:
     if node != HEALTH:
         return value
     health = device_health(value)

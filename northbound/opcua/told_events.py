@@ -11,7 +11,7 @@ from config.errors import InputError
 from positioner.history import HistoryReader
 from positioner.history.entries import Event
 
-MOST_EVENTS = 100
+MOST_TOLD_EVENTS = 100
 """At a look; of more the newest."""
 
 
@@ -50,7 +50,7 @@ class ToldEvents:
             with HistoryReader(self._history) as history:
                 return [
                     each
-                    for each in history.events(self._valve, limit=MOST_EVENTS)
+                    for each in history.events(self._valve, limit=MOST_TOLD_EVENTS)
                     if last < each.number <= (self._last or 0)
                 ]
         except InputError:

@@ -17,7 +17,7 @@ from northbound.opcua.valve_nodes import PERCENT
 
 REFUSED_WITHIN_S = 1.0
 """What does not hold is said sooner."""
-START, ABORT = 2, 255
+PADIM_START, PADIM_ABORT = 2, 255
 """Of PA-DIM's ExecutionModeEnum."""
 
 
@@ -52,7 +52,7 @@ class ValveDesk:
             return Answer("BadUserAccessDenied", refusal)
         percent = _number_in(sent)
         if not 0.0 <= percent <= PERCENT:
-            return Answer("BadOutOfRange", f"set point: allowed is 0 to 100 %, got {_shown(sent)}")
+            return Answer("BadOutOfRange", f"set point: allowed is 0 to 100 %, got {_show_sent(sent)}")
         set_reference = self._valve.commands.set_reference
         return _answer(await asyncio.to_thread(set_reference, role, percent / PERCENT))
 
@@ -90,12 +90,12 @@ class ValveDesk:
     async def auto_adjust(self, role: Role, sent: object) -> Answer:
         """Do as PA-DIM's AutoAdjustPositioner: start or abort."""
         mode = _number_in(sent)
-        if mode == START:
+        if mode == PADIM_START:
             return await self.identify(role)
-        if mode == ABORT:
+        if mode == PADIM_ABORT:
             return await self.break_off(role)
-        allowed = f"allowed are {START} (Start) and {ABORT} (Abort)"
-        return Answer("BadOutOfRange", f"ExecutionMode: {allowed}, got {_shown(sent)}")
+        allowed = f"allowed are {PADIM_START} (Start) and {PADIM_ABORT} (Abort)"
+        return Answer("BadOutOfRange", f"ExecutionMode: {allowed}, got {_show_sent(sent)}")
 
     async def end(self) -> None:
         """Break off what is under way, and wait for it."""
@@ -113,7 +113,7 @@ def _number_in(sent: object) -> float:
     return float(sent) if isinstance(sent, int | float) and not isinstance(sent, bool) else math.nan
 
 
-def _shown(sent: object) -> str:
+def _show_sent(sent: object) -> str:
     """Return what a client sent, as a line of a log has it; nothing is "no value"."""
     if sent is None:
         return "no value"

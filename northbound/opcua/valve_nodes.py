@@ -14,7 +14,7 @@ from northbound.observer import ValvePicture
 from northbound.observer.words import CODES, code_text, estimates_in_words
 from northbound.opcua.device_health import device_health
 
-PERCENT = 100.0
+PERCENT = 100.0  # of a share
 POSITION = "SignalSet.Position"
 PRESSURE = "SignalSet.Pressure"
 SIGNAL = f"{POSITION}.ControlSignal"

@@ -33,7 +33,7 @@ from northbound.opcua.told_events import ToldEvents
 from northbound.opcua.valve_desk import ValveDesk
 from northbound.opcua.valve_nodes import IDENTIFICATION, POSITION, SETPOINT, Shown, Why, refused, shown
 
-EVERY_S = 0.25
+PUBLISH_EVERY_S = 0.25
 SERVER = ua.NodeId(ua.ObjectIds.Server)
 """Where a client subscribes that wants the events of all valves."""
 SAID_BETTER = ("sending service fault", "Rejected active session")
@@ -96,7 +96,7 @@ async def _serve(
     door = Door(keys, sign_in, _say)
     server = Server(iserver=GuardedServer(door))
     await server.init()
-    spaces, event_type = await _prepared(server, valves, where, keys)
+    spaces, event_type = await _prepare_server(server, valves, where, keys)
     desks = [_desk(server, door, valve, space) for valve, space in zip(valves, spaces, strict=True)]
     logger.handlers = [_OneLine()]
     try:
@@ -115,7 +115,7 @@ async def _serve(
         await server.stop()
 
 
-async def _prepared(
+async def _prepare_server(
     server: Server, valves: Sequence[WatchedValve], where: Listening, keys: ApplicationKeys
 ) -> tuple[list[ValveSpace], ua.NodeId]:
     """Prepare the server, up to its start; return the nodes of each valve, and the type of its events."""
@@ -194,7 +194,7 @@ async def _keep_writing(
                     before[space.name, each.node] = each
                     await server.write_attribute_value(space.node_id(each.node), _data_value(each, space))
         try:
-            await asyncio.wait_for(stop.wait(), EVERY_S)
+            await asyncio.wait_for(stop.wait(), PUBLISH_EVERY_S)
         except TimeoutError:
             continue
 

@@ -11,7 +11,7 @@ from webpage.listening_arguments import add_listening, listening
 if TYPE_CHECKING:
     from northbound.observer.watched_valves import Place
 
-HELP = "open running valves in a browser: live trends, states and health in words; controls after signing in"
+HELP = "show running valves in a browser; whoever signs in may control them"
 EXAMPLE = "positioner page --config daemon.toml --roles roles.json"
 
 
@@ -22,24 +22,26 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
         type=Path,
         action="append",
         metavar="CONFIG.toml",
-        help="a daemon's file: all its valves; repeatable",
+        help="a daemon's file, with all its valves; may stand several times",
     )
-    parser.add_argument("--host", help="a daemon's host, without --config (127.0.0.1)")
+    parser.add_argument("--host", help="host of the daemon, where there is no --config (127.0.0.1)")
     parser.add_argument("--port", type=int, help="its supervisory port (5502)")
     parser.add_argument("--unit", type=int, help="the valve's Modbus unit (1)")
     add_certificates(parser)
-    parser.add_argument("--roles", type=Path, metavar="FILE", help="the passwords of operator and engineer")
+    parser.add_argument("--roles", type=Path, metavar="FILE", help="file with the passwords of operator and engineer")
     parser.add_argument(
-        "--set-password", choices=("operator", "engineer"), help="ask for this role's password, keep it in --roles, end"
+        "--set-password",
+        choices=("operator", "engineer"),
+        help="ask for the password of this role, write it to --roles, and end",
     )
     add_listening(parser)
     parser.add_argument(
         "--password-file",
         type=Path,
         metavar="FILE",
-        help="the first line is the password of everybody; needed to listen beyond this machine",
+        help="its first line is the password for everybody; needed with --listen-host",
     )
-    parser.add_argument("--no-open", action="store_true", help="print the address, open no browser")
+    parser.add_argument("--no-open", action="store_true", help="print the address only; open no browser")
 
 
 def run(arguments: argparse.Namespace) -> int:

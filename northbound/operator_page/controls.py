@@ -35,7 +35,7 @@ class Door:
     def __init__(self, sign_in: SignIn | None, signed: SignedIn) -> None:
         self._sign_in = sign_in
         self._signed = signed
-        self._button = ui.button("Sign in", icon="login", on_click=self._pressed).props(
+        self._button = ui.button("Sign in", icon="login", on_click=self._handle_press).props(
             "flat dense no-caps color=white"
         )
         self._button.props('data-testid="door"')
@@ -60,7 +60,7 @@ class Door:
         self._button.set_text("Sign in" if watches else f"{role.name.lower()}: sign out")
         self._button.set_icon("login" if watches else "logout")
 
-    def _pressed(self) -> None:
+    def _handle_press(self) -> None:
         if self._signed.at(time.monotonic()) is Role.OBSERVER:
             self._dialog.open()
         else:
@@ -161,7 +161,7 @@ class Controls:
         with ui.row().classes("items-center"):
             ui.label("mode")
             for mode in Mode:
-                button = ui.button(mode.text, on_click=lambda mode=mode: self._chosen(mode))
+                button = ui.button(mode.text, on_click=lambda mode=mode: self._handle_choice(mode))
                 button.props(f'no-caps outline dense data-testid="mode-{mode.text}"')
                 self._parts.append((button, ("mode",)))
 
@@ -170,8 +170,8 @@ class Controls:
         with ui.row().classes("items-end full-width no-wrap"):
             self._pressure = NumberField(f"manual: pressure, {self._units.pressure.name}", name="pressure")
             self._pressure.classes("col").props('data-testid="pressure-input"')
-            self._pressure.on("keydown.enter", lambda: self._chosen(Mode.MANUAL))
-            button = ui.button("Command it", on_click=lambda: self._chosen(Mode.MANUAL))
+            self._pressure.on("keydown.enter", lambda: self._handle_choice(Mode.MANUAL))
+            button = ui.button("Command", on_click=lambda: self._handle_choice(Mode.MANUAL))
             button.props('no-caps data-testid="set-pressure"')
         self._parts += [(self._pressure, ("manual_pressure", "mode")), (button, ("manual_pressure", "mode"))]
 
@@ -207,7 +207,7 @@ class Controls:
             return
         await self.do(self._valve.commands.set_reference, reference / 100)
 
-    async def _chosen(self, mode: Mode) -> None:
+    async def _handle_choice(self, mode: Mode) -> None:
         """Ask before a mode in which the valve may move; hold moves nothing."""
         if mode is Mode.AUTOMATIC:
             await self._ask_automatic()

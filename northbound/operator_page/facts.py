@@ -57,7 +57,7 @@ def status(picture: ValvePicture) -> list[Fact]:
     """Return in words what is said in no tile: mode, state and fault are."""
     return [
         Fact("service", picture.text("service"), BY_NAME["service"].text),
-        Fact("doing as asked", picture.text("why"), BY_NAME["why"].text),
+        Fact("law", picture.text("why"), BY_NAME["why"].text),
         Fact("measurement", picture.freshness.measurement or picture.text("quality"), BY_NAME["quality"].text),
         Fact(
             "device",
@@ -65,7 +65,7 @@ def status(picture: ValvePicture) -> list[Fact]:
             BY_NAME["device_status"].text,
         ),
         Fact("CANopen's emergency", _emergency(picture.value("emergency")), BY_NAME["emergency"].text),
-        Fact("knowledge from before", picture.text("restored"), BY_NAME["restored"].text),
+        Fact("restored knowledge", picture.text("restored"), BY_NAME["restored"].text),
         Fact("experiment", picture.text("experiment_state"), BY_NAME["experiment_state"].text),
     ]
 
@@ -93,7 +93,7 @@ def cycle(picture: ValvePicture) -> list[Fact]:
     counts = [
         ("cycles", "cycles"),
         ("missed periods", "missed_periods"),
-        ("samples not looked at", "lost_samples"),
+        ("samples not used", "lost_samples"),
         ("lost replies", "lost_replies"),
         ("not recorded", "unrecorded"),
     ]
@@ -101,7 +101,7 @@ def cycle(picture: ValvePicture) -> list[Fact]:
         *(Fact(label, milli.text(picture.value(name)), BY_NAME[name].text) for label, name in times),
         Fact("age of the sample", Unit("s", 1.0, 3).text(age_s), BY_NAME["sample_age"].text),
         *(Fact(label, _count(picture.value(name)), BY_NAME[name].text) for label, name in counts),
-        Fact("daemon started anew", f"{picture.restarts} times since this page looks"),
+        Fact("restarts of the daemon", f"{picture.restarts} since this page is open"),
     ]
 
 

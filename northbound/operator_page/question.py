@@ -38,11 +38,11 @@ class Question:
         self._answers.clear()
         with self._answers:
             for answer in answers:
-                button = ui.button(answer.label, on_click=lambda answer=answer: self._answered(answer))
+                button = ui.button(answer.label, on_click=lambda answer=answer: self._handle_answer(answer))
                 button.props(f'no-caps data-testid="answer-{answer.name}"')
             ui.button("Cancel", on_click=self._dialog.close).props('no-caps flat data-testid="answer-cancel"')
         self._dialog.open()
 
-    async def _answered(self, answer: Answer) -> None:
+    async def _handle_answer(self, answer: Answer) -> None:
         self._dialog.close()
         await answer.do()

@@ -16,7 +16,7 @@ from northbound.operator_page.marks import DASHES
 from webpage.theme import Theme
 from webpage.units import Unit, Units
 
-MOST_STEPS = 1500
+MOST_RECORDED_STEPS = 1500
 """Of what is shown; two rows a step at most."""
 ZOOM_EVERY_S = 0.2
 COLUMNS = ("reference_m", "position_m")
@@ -33,7 +33,7 @@ class RecordedPlot:
         self._unit = Unit("", 1.0, 0)
         self._chart = ui.echart({}).classes("full-width").style("height: 240px")
         self._chart.props('data-testid="recorded" role="img" aria-label="the last minutes as recorded"')
-        self._chart.on("chart:datazoom", self._zoomed, args=["start", "end", "batch"], throttle=ZOOM_EVERY_S)
+        self._chart.on("chart:datazoom", self._handle_zoom, args=["start", "end", "batch"], throttle=ZOOM_EVERY_S)
         self._chart.set_visibility(False)
         theme.listen(self.redraw)
 
@@ -54,7 +54,7 @@ class RecordedPlot:
         self._chart.options.update(self._whole())
         self._chart.update()
 
-    def _zoomed(self, event: events.GenericEventArguments) -> None:
+    def _handle_zoom(self, event: events.GenericEventArguments) -> None:
         told = (event.args.get("batch") or [event.args])[0]
         begin, end = float(told["start"]) / 100, float(told["end"]) / 100
         time_s = self._columns["time_s"]
@@ -70,8 +70,8 @@ class RecordedPlot:
         part = {name: column[inside] for name, column in self._columns.items()}
         if not len(part["time_s"]):
             return []
-        step_s = (part["time_s"][-1] - part["time_s"][0]) / MOST_STEPS
-        if len(part["time_s"]) > 2 * MOST_STEPS:
+        step_s = (part["time_s"][-1] - part["time_s"][0]) / MOST_RECORDED_STEPS
+        if len(part["time_s"]) > 2 * MOST_RECORDED_STEPS:
             part = thinned(part, step_s)
         lines = [np.round(self._unit.per_si * part[name], 4) for name in COLUMNS]
         rows: list[list[float]] = np.column_stack([np.round(part["time_s"] - time_s[-1], 5), *lines]).tolist()

@@ -77,17 +77,17 @@ class TestCard:
         )
 
         async def begin() -> None:
-            await self._do(self._played)
+            await self._do(self._play)
 
         self._question.ask(f"{self._test.value}: the valve moves", lines, [Answer("Consent and begin", "begin", begin)])
 
     async def _take_report(self) -> None:
         self._written = b""
-        await self._do(self._reported)
+        await self._do(self._write_report)
         if self._written:
             ui.download.content(self._written, f"{self._place.name}.html")
 
-    def _played(self, role: Role) -> Confirmation:
+    def _play(self, role: Role) -> Confirmation:
         def show(said: str) -> None:
             self._said = said
 
@@ -97,7 +97,7 @@ class TestCard:
         finally:
             self._runs = False
 
-    def _reported(self, _: Role) -> Confirmation:
+    def _write_report(self, _: Role) -> Confirmation:
         """Write the report, and keep it to be taken by the browser."""
         with tempfile.TemporaryDirectory() as folder:
             out = Path(folder) / f"{self._place.name}.html"

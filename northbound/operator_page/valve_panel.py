@@ -27,7 +27,7 @@ from webpage.units import Units
 
 MOVES_S = 120.0
 """Of which the response figures are worked out."""
-SHOWN_EVENTS = 12
+SHOWN_EVENTS = 12  # what a card has room for
 HISTORY_EVERY_S = 1.0
 LABELS = ("reference", "position", "pressure", "command")
 
@@ -162,7 +162,7 @@ class ValvePanel:
         with ui.card().classes("full-width").props('data-testid="moves"'):
             with ui.row().classes("items-center full-width justify-between"):
                 heading("Last moves, and their response")
-                ui.button("Work out", on_click=self._work_out).props('no-caps outline dense data-testid="work-out"')
+                ui.button("Show", on_click=self._work_out).props('no-caps outline dense data-testid="work-out"')
             self._recorded = RecordedPlot(theme, self._units)
             self._moves_said = ui.html("", sanitize=False).classes("scrolling full-width")
 
@@ -171,7 +171,7 @@ class ValvePanel:
         settings = self.valve.place.settings
         travel = None if settings is None else settings.valve.travel
         moves = await aside(last_moves, view, time.monotonic(), MOVES_S, folder, time.time(), travel)
-        self._moves_said.set_content(_told(moves))
+        self._moves_said.set_content(_describe_moves(moves))
         if moves is not None:
             self._recorded.show(moves.recording, self.valve.view.stroke_m)
 
@@ -198,7 +198,7 @@ class ValvePanel:
                     ui.label(line)
 
 
-def _told(moves: LastMoves | None) -> str:
+def _describe_moves(moves: LastMoves | None) -> str:
     if moves is None:
         return "nothing was measured yet"
     return as_html("", [moves.source, *moves.response.blocks()])

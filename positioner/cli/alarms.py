@@ -8,7 +8,7 @@ from positioner.cli.parts.daemon_address import add_connection, connected
 if TYPE_CHECKING:
     from config.codes import Ne107Cause
 
-HELP = "list a valve's alarms with cause and advice; acknowledge or shelve one"
+HELP = "list the alarms of a valve with cause and advice; acknowledge or shelve one"
 EXAMPLE = "positioner alarms --acknowledge friction_high"
 
 MINUTE_S = 60.0
@@ -17,10 +17,10 @@ MINUTE_S = 60.0
 def add_arguments(parser: argparse.ArgumentParser) -> None:
     """Declare the command line."""
     what = parser.add_mutually_exclusive_group()
-    what.add_argument("--acknowledge", metavar="ALARM", help="by its name, or `all`")
-    what.add_argument("--shelve", metavar="ALARM", help="put it aside for --minutes")
-    what.add_argument("--unshelve", metavar="ALARM", help="show it again")
-    parser.add_argument("--minutes", type=float, default=60.0, metavar="N", help="for how long it is shelved (60)")
+    what.add_argument("--acknowledge", metavar="ALARM", help="acknowledge this alarm, or all")
+    what.add_argument("--shelve", metavar="ALARM", help="shelve this alarm for --minutes")
+    what.add_argument("--unshelve", metavar="ALARM", help="end its shelving")
+    parser.add_argument("--minutes", type=float, default=60.0, metavar="N", help="time of shelving (60)")
     parser.add_argument("--json", action="store_true", help="print one JSON object")
     add_connection(parser)
 

@@ -4,22 +4,28 @@ import argparse
 import sys
 from pathlib import Path
 
-HELP = (
-    "run the open benchmark: loops and hidden effects with truth, ours and the literature's methods, one results file"
-)
+HELP = "run the open benchmark of this and other methods, on loops and effects with known truth"
 EXAMPLE = "positioner bench cases --drawn 300"
 RESULTS = "results.csv"
 
 
 def add_arguments(parser: argparse.ArgumentParser) -> None:
     """Declare the command line."""
-    parser.add_argument("folder", type=Path, metavar="DIR", help="of the cases: written where it holds none")
-    parser.add_argument("--drawn", type=int, default=300, metavar="N", help="loops drawn with truth (300)")
-    parser.add_argument("--effects", type=int, default=0, metavar="N", help="hidden effects, half a minute each (0)")
-    parser.add_argument("--first-seed", type=int, default=4000, metavar="SEED", help="of those that are drawn (4000)")
-    parser.add_argument("--labelled", type=Path, metavar="DIR", help="loops of others: labels.csv and their files")
-    parser.add_argument("--judge", type=Path, nargs="+", default=[], metavar="FILE", help="results of other methods")
-    parser.add_argument("--workers", type=int, metavar="N", help="processes (one a core)")
+    parser.add_argument("folder", type=Path, metavar="DIR", help="folder of the cases; made if it is empty")
+    parser.add_argument("--drawn", type=int, default=300, metavar="N", help="number of simulated loops (300)")
+    parser.add_argument(
+        "--effects", type=int, default=0, metavar="N", help="number of hidden effects, half a minute each (0)"
+    )
+    parser.add_argument(
+        "--first-seed", type=int, default=4000, metavar="SEED", help="first seed of the simulated cases (4000)"
+    )
+    parser.add_argument(
+        "--labelled", type=Path, metavar="DIR", help="measured loops of others: labels.csv and its files"
+    )
+    parser.add_argument(
+        "--judge", type=Path, nargs="+", default=[], metavar="FILE", help="results files of other methods"
+    )
+    parser.add_argument("--workers", type=int, metavar="N", help="number of processes (one a core)")
 
 
 def run(arguments: argparse.Namespace) -> int:

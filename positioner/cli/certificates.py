@@ -3,7 +3,7 @@
 import argparse
 from pathlib import Path
 
-HELP = "make a test certificate authority and certificates for Modbus/TCP Security, one per end and role"
+HELP = "make certificates for trials of Modbus/TCP Security: an authority, each end, each role"
 EXAMPLE = "positioner certificates -o certificates --host gateway-7 --host 10.0.0.7"
 
 HERE = ("localhost", "127.0.0.1")
@@ -16,9 +16,9 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
         "--host",
         action="append",
         metavar="NAME",
-        help=f"a host name or address under which device and daemon are called (without any: {', '.join(HERE)})",
+        help=f"host name or address of device or daemon ({', '.join(HERE)})",
     )
-    parser.add_argument("--days", type=_days, default=365, help="how long they are valid (365)")
+    parser.add_argument("--days", type=_days, default=365, help="days of validity (365)")
 
 
 def run(arguments: argparse.Namespace) -> int:

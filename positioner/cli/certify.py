@@ -10,7 +10,7 @@ if TYPE_CHECKING:
     from config.daemon_file import DaemonFile
     from positioner.control.laws.slides.certificate import Certificate, Refused
 
-HELP = "prove for an identified valve where moves end, the overtravel, the slides a step; moves nothing"
+HELP = "prove bounds of error, overtravel and slides a step for an identified valve; moves nothing"
 EXAMPLE = "positioner certify site.toml"
 
 

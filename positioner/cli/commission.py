@@ -11,7 +11,7 @@ if TYPE_CHECKING:
     from config.daemon_file import DaemonFile
     from positioner.tests_on_the_valve.commissioning import Proposal
 
-HELP = "find what a daemon's file must say of its valve, and write it there after asking (moves it from end to end)"
+HELP = "find stroke, action and law of a valve, ask, and write the daemon's file (moves the valve from end to end)"
 EXAMPLE = "positioner commission site.toml"
 
 WARNING = (
@@ -26,11 +26,11 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
     """Declare the command line."""
     add_config(
         parser,
-        text="a daemon's file; [valve] stroke_m may be missing, travel_deg not; the daemon must not run",
+        text="the daemon's file, without [valve] stroke_m if it is not known; stop the daemon first",
     )
-    parser.add_argument("--valve", dest="name", metavar="NAME", help="which of that file's valves")
-    parser.add_argument("--yes", action="store_true", help="ask nothing: move it, and write what is found")
-    parser.add_argument("--keep", choices=("factory", "as_found", "as_left"), help="keep the outcome as this")
+    parser.add_argument("--valve", dest="name", metavar="NAME", help="name of the valve, where the file has several")
+    parser.add_argument("--yes", action="store_true", help="move the valve and write the result without a question")
+    parser.add_argument("--keep", choices=("factory", "as_found", "as_left"), help="keep the result under this name")
     parser.add_argument("--json", type=Path, metavar="FILE", help="write verdict, figures and proposals as JSON")
 
 
@@ -62,7 +62,7 @@ def run(arguments: argparse.Namespace) -> int:
         kept(found.outcome, file, arguments, arguments.keep or "")
     if not found.proposals:
         return 1
-    return _written(path, file, found.proposals, arguments)
+    return _write_proposals(path, file, found.proposals, arguments)
 
 
 def _file(path: Path, name: str | None) -> "DaemonFile":
@@ -88,7 +88,9 @@ def _file(path: Path, name: str | None) -> "DaemonFile":
     return validated(DaemonFile, whole | {"valve": valve | {"stroke_m": STROKE_UNKNOWN_M}}, str(path), path.parent)
 
 
-def _written(path: Path, file: "DaemonFile", proposals: "tuple[Proposal, ...]", arguments: argparse.Namespace) -> int:
+def _write_proposals(
+    path: Path, file: "DaemonFile", proposals: "tuple[Proposal, ...]", arguments: argparse.Namespace
+) -> int:
     """Show what is proposed, ask, and write it; 0 if it was written."""
     from config.daemon_file import load_daemon
     from config.errors import InputError

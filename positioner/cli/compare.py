@@ -7,7 +7,7 @@ from positioner.cli.parts.export_arguments import add_export_arguments, read_any
 from positioner.cli.parts.noise_argument import add_noise_argument, noise_said
 from positioner.cli.parts.output_files import writable, write_json
 
-HELP = "hold a model against a recording in free run and say where it fails; exit status 1 if it is not adequate"
+HELP = "simulate a recording and print where the model fails; exit status 1 if it is not adequate"
 EXAMPLE = "positioner compare rec.csv --valve seed --report compared.html"
 
 
@@ -16,7 +16,7 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
     parser.add_argument("recording", type=Path, metavar="REC", help="a recording, CSV or Parquet")
     parser.add_argument("--valve", required=True, metavar="VALVE.toml", help="a valve file, or a shipped valve's name")
     parser.add_argument("--json", type=Path, metavar="FILE", help="write all numbers as JSON")
-    parser.add_argument("--report", type=Path, metavar="FILE.html", help="write a report to be read in a browser")
+    parser.add_argument("--report", type=Path, metavar="FILE.html", help="write a report for a browser")
     add_noise_argument(parser)
     add_export_arguments(parser)
 

@@ -3,7 +3,7 @@
 import argparse
 from pathlib import Path
 
-HELP = "print a shell's completion script for these commands"
+HELP = "print the completion script of a shell"
 EXAMPLE = "positioner completion bash > positioner.bash; source positioner.bash"
 
 SHELLS = ("bash", "zsh", "tcsh")

@@ -4,16 +4,28 @@ import argparse
 
 from positioner.cli.parts.valve_test import add_test_arguments, bounds_of, checked, finished, played_all, playing
 
-HELP = "break-away friction in operation: the command creeps until the stem moves, and back (moves it: state S3)"
+HELP = "test: break-away friction in operation; the command creeps until the stem moves, then returns (moves the valve)"
 EXAMPLE = "positioner cst site.toml --rate 0.0005"
 
 
 def add_arguments(parser: argparse.ArgumentParser) -> None:
     """Declare the command line."""
     add_test_arguments(parser, recordings=False)
-    parser.add_argument("--start", type=float, default=0.003, metavar="SHARE", help="motion that ends it (0.003)")
-    parser.add_argument("--most", type=float, default=0.02, metavar="SHARE", help="motion that breaks it off (0.02)")
-    parser.add_argument("--rate", type=float, default=5e-4, metavar="PER_S", help="of the command's range (0.0005)")
+    parser.add_argument(
+        "--start",
+        type=float,
+        default=0.003,
+        metavar="SHARE",
+        help="travel that ends the creep, share of the stroke (0.003)",
+    )
+    parser.add_argument("--most", type=float, default=0.02, metavar="SHARE", help="travel that stops the test (0.02)")
+    parser.add_argument(
+        "--rate",
+        type=float,
+        default=5e-4,
+        metavar="PER_S",
+        help="rate of the command, share of its range a second (0.0005)",
+    )
 
 
 def run(arguments: argparse.Namespace) -> int:

@@ -45,7 +45,7 @@ if TYPE_CHECKING:
     from config.valve_file import ValveParameters
     from positioner.dcs import Dcs
 
-HELP = "identify and position a simulated sticking valve over a real bus, by two laws, in under a minute"
+HELP = "show both laws on a simulated sticking valve, over a real bus, in about a minute"
 EXAMPLE = "positioner demo --out demo-out"
 
 PSI = 6894.757
@@ -191,10 +191,10 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
     parser.add_argument(
         "--hidden",
         action="store_true",
-        help="give the valve an effect, find it in the daemon's recording, and tell it to the law",
+        help="add an effect to the valve, find it in the daemon's recording, and give it to the law",
     )
-    parser.add_argument("--out", type=Path, metavar="DIR", help="keep picture, recordings, configs and logs there")
-    parser.add_argument("--json", type=Path, metavar="FILE", help="write the outcome there")
+    parser.add_argument("--out", type=Path, metavar="DIR", help="folder for picture, recordings, files and logs")
+    parser.add_argument("--json", type=Path, metavar="FILE", help="write the result as JSON")
 
 
 def run(arguments: argparse.Namespace) -> int:
@@ -255,7 +255,7 @@ def _both_laws(bus: str, folder: Path, valve: "ValveParameters") -> DemoOutcome:
         slower = replace(setup, period_s=SLIDES_PERIOD_S, reply_timeout_s=SLIDES_REPLY_TIMEOUT_S)
         with daemon_running(folder / "slides.toml", slower, slave, SLIDES_TABLES) as daemon:
             _print_line(f"the same valve; another daemon {daemon}; slides, the default law")
-            slides = _play_slides(port_in(daemon), _aged(valve))
+            slides = _play_slides(port_in(daemon), _age_packing(valve))
     return DemoOutcome(
         paper.steps + slides.steps,
         paper.identified + slides.identified,
@@ -263,7 +263,7 @@ def _both_laws(bus: str, folder: Path, valve: "ValveParameters") -> DemoOutcome:
     )
 
 
-def _aged(valve: "ValveParameters") -> "ValveParameters":
+def _age_packing(valve: "ValveParameters") -> "ValveParameters":
     return valve.model_copy(update={"coulomb_n": AGEING * valve.coulomb_n, "static_n": AGEING * valve.static_n})
 
 
@@ -277,7 +277,7 @@ def _play_paper(port: int, valve: "ValveParameters", powered_s: float) -> DemoOu
         steps = _steps(dcs, NEW, STEPS, limit_pu=LARGEST_ERROR_PU, until_s=powered_s + AGES_AT_S)
         _observe(dcs, AGES_AT_S + 0.5 - (time.monotonic() - powered_s), "the packing ages by 30 %")
         steps += _steps(dcs, "aged", STEPS, limit_pu=None)
-        identified += identify(dcs, "aged", AGED_ALPHA_PA, _aged(valve))
+        identified += identify(dcs, "aged", AGED_ALPHA_PA, _age_packing(valve))
         steps += _steps(dcs, "identified anew", STEPS, limit_pu=LARGEST_ERROR_PU)
         steps += _steps(dcs, SMALL, SMALL_STEPS, limit_pu=None)
         return DemoOutcome(steps, identified, {PAPER: _statistics(dcs)})
@@ -325,7 +325,7 @@ def _acknowledge(dcs: "Dcs") -> bool:
     return True
 
 
-def _taken_up_again(dcs: "Dcs") -> None:
+def _resume_automatic(dcs: "Dcs") -> None:
     """Choose automatic again after a fault, from where the stem is; where it comes back meanwhile, it stays so."""
     from positioner.dcs import DcsError
 
@@ -350,15 +350,15 @@ def _identify(
         _show_passing(f"identifying ({phase}): {100 * progress:3.0f} %")
 
     for _ in range(IDENTIFICATIONS):
-        _taken_up_again(dcs)
+        _resume_automatic(dcs)
         problem = dcs.identify(excitation, within_s, show)
         _print_line(f"identified ({phase})" if problem is None else f"identification ({phase}) failed: {problem}")
         if problem is None:
             break
-    return [_compared(dcs, phase, name, value) for name, value in true.items()]
+    return [_compare_estimate(dcs, phase, name, value) for name, value in true.items()]
 
 
-def _compared(dcs: "Dcs", phase: str, name: str, true: float) -> ComparedEstimate:
+def _compare_estimate(dcs: "Dcs", phase: str, name: str, true: float) -> ComparedEstimate:
     from config.codes import Refusal
 
     now = dcs.get_all(f"{name}_e", f"{name}_std", f"{name}_reason")
@@ -380,7 +380,7 @@ def _steps(
     steps = []
     for reference_pu in references_pu:
         for _ in range(STEP_TRIES):
-            _taken_up_again(dcs)
+            _resume_automatic(dcs)
             settled_pu = _step(dcs, phase, reference_pu, step_s)
             if not dcs.get("fault"):
                 break

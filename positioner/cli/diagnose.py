@@ -18,10 +18,10 @@ if TYPE_CHECKING:
     from workbench.diagnosis.extension import Extension
     from workbench.select.tangent_preview import TangentScore
 
-HELP = "find the effect that a model lacks to explain a recording; exit status 1 if anything is missing"
+HELP = "find the effect that the model lacks; exit status 1 if anything is missing"
 EXAMPLE = "positioner diagnose rec.csv --valve seed --test other.csv --json diagnosed.json"
 
-PREVIEWED = 5
+PREVIEWED = 5  # effects in the line of the preview
 
 
 def add_arguments(parser: argparse.ArgumentParser) -> None:
@@ -29,39 +29,40 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
     parser.add_argument("recordings", type=Path, nargs="+", metavar="REC", help="recordings, CSV or Parquet")
     parser.add_argument("--valve", required=True, metavar="VALVE.toml", help="a valve file, or a shipped valve's name")
     parser.add_argument(
-        "--test", type=Path, metavar="REC", help="recording held out, to judge by (the last third of the others)"
+        "--test",
+        type=Path,
+        metavar="REC",
+        help="a recording that judges and is not fitted (the last third of the others)",
     )
     parser.add_argument(
         "--effects",
         nargs="+",
         metavar="NAME",
-        help="effects to try (the whole library); one of your own by its .py file",
+        help="effects to try, or .py files of your own (all known effects)",
     )
     parser.add_argument("--json", type=Path, metavar="FILE", help="write all numbers as JSON")
-    parser.add_argument("--report", type=Path, metavar="FILE.html", help="write a report to be read in a browser")
+    parser.add_argument("--report", type=Path, metavar="FILE.html", help="write a report for a browser")
     parser.add_argument(
         "--experiment",
         type=Path,
         metavar="FILE",
-        help="write the input that tells the remaining effects apart",
+        help="write an input that would show which of the remaining effects it is",
     )
     parser.add_argument(
         "-o",
         "--out",
         type=Path,
         metavar="BETTER.toml",
-        help="write the extended, or refitted, valve file where the verdict is sure",
+        help="write the better valve file, where the verdict is certain",
     )
     parser.add_argument(
         "--add",
         nargs="+",
         default=[],
         metavar="NAME",
-        help="with -o: add these effects, whatever the verdict",
+        help="with -o: add these effects in any case",
     )
-    parser.add_argument(
-        "--budget-s", type=float, metavar="S", help="end after this many seconds, with what is known by then"
-    )
+    parser.add_argument("--budget-s", type=float, metavar="S", help="time limit; then prints what is known")
     add_pressure_argument(parser)
     add_noise_argument(parser)
     add_export_arguments(parser)
@@ -99,7 +100,7 @@ def run(arguments: argparse.Namespace) -> int:
     recordings = [noise_said(read_any(path, arguments, stroke_m), arguments) for path in arguments.recordings]
     test = noise_said(read_any(arguments.test, arguments, stroke_m), arguments) if arguments.test else None
     named = files_named(arguments.recordings, arguments.test, arguments.valve)
-    with naming(named), _known_at_all(), Progress() as progress:
+    with naming(named), _end_without_result(), Progress() as progress:
         diagnosis = diagnose(
             recordings,
             valve,
@@ -119,9 +120,9 @@ def run(arguments: argparse.Namespace) -> int:
     if diagnosis.by_pressure:
         print(f"to diagnose the stem by the measured pressure: {by_pressure_command(arguments)}")
     if diagnosis.verdict == "unexplained":
-        print(f"to look for a form of what the library lacks: {discover_command(arguments)}")
+        print(f"to look for a formula of what is missing: {discover_command(arguments)}")
     if arguments.out is not None:
-        added = _added(diagnosis, valve, recordings, test, arguments) if arguments.add else None
+        added = _add_effects(diagnosis, valve, recordings, test, arguments) if arguments.add else None
         _write_valve(diagnosis, added, arguments)
     if arguments.json is not None:
         written = str(arguments.experiment) if diagnosis.experiment and arguments.experiment else None
@@ -135,7 +136,7 @@ def run(arguments: argparse.Namespace) -> int:
 
 
 @contextmanager
-def _known_at_all() -> Iterator[None]:
+def _end_without_result() -> Iterator[None]:
     """Say so where the budget is over before anything is known.
 
     Raises:
@@ -147,17 +148,17 @@ def _known_at_all() -> Iterator[None]:
     try:
         yield
     except BrokenOff:
-        raise CommandFailed("--budget-s was over before the valve as it is was fitted: nothing is known") from None
+        raise CommandFailed("--budget-s ended before the first fit: nothing is known") from None
 
 
 def _tell_experiment(diagnosis: "Diagnosis", path: Path | None) -> None:
     if diagnosis.experiment is None:
         return
     if path is None:
-        print("--experiment FILE writes the experiment that would tell apart what the recordings do not")
+        print("--experiment FILE writes an experiment that separates the remaining candidates")
         return
     diagnosis.experiment.write(path)
-    print(f"{path}: the experiment that would tell apart what the recordings do not")
+    print(f"{path}: the experiment that separates the remaining candidates")
 
 
 def _require_out(arguments: argparse.Namespace) -> None:
@@ -172,7 +173,7 @@ def _require_out(arguments: argparse.Namespace) -> None:
         raise InputError("--add", "needs -o BETTER.toml, where the valve is written")
 
 
-def _added(
+def _add_effects(
     diagnosis: "Diagnosis",
     valve: "ValveFile",
     recordings: "list[Recording]",

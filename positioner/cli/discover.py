@@ -12,10 +12,10 @@ from positioner.cli.parts.pressure_argument import add_pressure_argument
 if TYPE_CHECKING:
     from workbench.discover.discovery import Discovery
 
-HELP = "find the form of what the library does not explain, as an effect's file; exit status 1 if no form does"
+HELP = "find a formula for what no known effect explains; exit status 1 if there is none"
 EXAMPLE = "positioner discover rec.csv --valve valve.toml --test other.csv -o found.py --picture found.png"
 
-SHOWN = 5
+SHOWN_FORMS = 5  # forms that are printed
 
 
 def add_arguments(parser: argparse.ArgumentParser) -> None:
@@ -23,12 +23,15 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
     parser.add_argument("recordings", type=Path, nargs="+", metavar="REC", help="recordings, CSV or Parquet")
     parser.add_argument("--valve", required=True, metavar="VALVE.toml", help="a valve file, or a shipped valve's name")
     parser.add_argument(
-        "--test", type=Path, metavar="REC", help="recording held out, to judge by (the last third of the others)"
+        "--test",
+        type=Path,
+        metavar="REC",
+        help="a recording that judges and is not fitted (the last third of the others)",
     )
     parser.add_argument(
-        "-o", "--out", type=Path, metavar="FORM.py", help="write the form as an effect's file, which `extend` takes"
+        "-o", "--out", type=Path, metavar="FORM.py", help="write the formula as an effect's file, for `extend`"
     )
-    parser.add_argument("--picture", type=Path, metavar="FILE.png", help="draw what the form adds over its variable")
+    parser.add_argument("--picture", type=Path, metavar="FILE.png", help="draw the formula over its variable")
     parser.add_argument("--json", type=Path, metavar="FILE", help="write all numbers as JSON")
     add_pressure_argument(parser)
     add_noise_argument(parser)
@@ -94,7 +97,7 @@ def _require_new(path: Path | None) -> None:
 
 
 def _tell_proposal(names: tuple[str, ...]) -> None:
-    print(f"forms by projection, not a verdict: {', '.join(names[:SHOWN])}", flush=True)
+    print(f"forms by projection, not a verdict: {', '.join(names[:SHOWN_FORMS])}", flush=True)
 
 
 def _write_form(found: "Discovery", arguments: argparse.Namespace) -> None:

@@ -14,7 +14,7 @@ if TYPE_CHECKING:
     from workbench.discriminate.discrimination import Played, Player, Round
     from workbench.discriminate.experiment_design import Bounds, DesignedExperiment
 
-HELP = "diagnose, then play experiments on the valve until the rivals are told apart (moves it: state S3)"
+HELP = "diagnose, then play experiments until the remaining candidates differ (moves the valve)"
 EXAMPLE = "positioner discriminate site.toml --rec rec.csv --valve better.toml --out told"
 
 EXPERIMENT = "experiment-{}.csv"
@@ -29,21 +29,24 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
     parser.add_argument("--rec", type=Path, nargs="+", required=True, metavar="REC", help="recordings, CSV or Parquet")
     parser.add_argument("--valve", required=True, metavar="VALVE.toml", help="a valve file, or a shipped valve's name")
     parser.add_argument(
-        "--test", type=Path, metavar="REC", help="recording held out, to judge by (the last third of the others)"
+        "--test",
+        type=Path,
+        metavar="REC",
+        help="a recording that judges and is not fitted (the last third of the others)",
     )
-    parser.add_argument("--effects", nargs="+", metavar="NAME", help="effects to try (the whole library)")
+    parser.add_argument("--effects", nargs="+", metavar="NAME", help="effects to try (all known effects)")
     add_pressure_argument(parser)
-    parser.add_argument("--budget", type=int, default=60, metavar="MOVES", help="moves allowed in all (60)")
-    parser.add_argument("--out", type=Path, default=Path("discriminated"), help="where recordings and verdict go")
-    parser.add_argument("--name", help="which of the daemon's valves")
+    parser.add_argument("--budget", type=int, default=60, metavar="MOVES", help="largest number of moves (60)")
+    parser.add_argument("--out", type=Path, default=Path("discriminated"), help="folder for recordings and verdict")
+    parser.add_argument("--name", help="name of the valve, where the file has several")
     parser.add_argument(
         "--tls",
         nargs=3,
         type=Path,
         metavar=("AUTHORITY.pem", "CERTIFICATE.pem", "KEY"),
-        help="connect with Modbus/TCP Security, as an engineer",
+        help="use Modbus/TCP Security, with a certificate of role engineer",
     )
-    parser.add_argument("--seed", type=int, default=0, help="of the designs (0)")
+    parser.add_argument("--seed", type=int, default=0, help="seed of the experiments (0)")
 
 
 def run(arguments: argparse.Namespace) -> int:
@@ -81,7 +84,7 @@ def run(arguments: argparse.Namespace) -> int:
     print(found.sentence, flush=True)
     fits = rivals_of(found)
     if found.verdict != "one_of":
-        print("no rivals to be told apart; nothing was played")
+        print("there is one candidate: nothing was played")
         return 0 if found.verdict in ("adequate", "missing") else 1
     effects = [find_effect(name, "effects") for name in arguments.effects or tried_effects()]
     broken_off = told_when_broken_off("discriminate", lambda: f"{BROKEN_OFF} {arguments.out}")
@@ -89,7 +92,7 @@ def run(arguments: argparse.Namespace) -> int:
         told = discriminate(
             fits,
             [*recordings, test] if test else recordings,
-            _kept(player_on(file, arguments), arguments.out),
+            _keep_recordings(player_on(file, arguments), arguments.out),
             bounds,
             {each.written: each for each in effects},
             budget=arguments.budget,
@@ -138,7 +141,7 @@ def _tell(each: "Round") -> None:
     print(f"{each.moves} moves: {each.name}, separation {each.separation:.3g}; odds {odds}", flush=True)
 
 
-def _kept(player: "Player", folder: Path) -> "Player":
+def _keep_recordings(player: "Player", folder: Path) -> "Player":
     """Return it so that each recording is written before anything is made of it, whatever becomes of the rest.
 
     Beside those of an earlier run, which no valve plays again.

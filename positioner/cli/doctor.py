@@ -13,7 +13,7 @@ if TYPE_CHECKING:
 
     Check = Callable[[DaemonFile, Path], str]
 
-HELP = "check installation, config, bus, timing and permissions, one line each; moves nothing"
+HELP = "check installation, file, bus, timing and permissions; moves nothing"
 EXAMPLE = "positioner doctor daemon.toml"
 
 LEAST_DAYS = 14

@@ -10,7 +10,7 @@ from positioner.cli.parts.output_files import writable, write_json
 if TYPE_CHECKING:
     from positioner.estimation.recording_estimates import RecordingEstimates
 
-HELP = "identify a, b, c, k and their ratios from a recording; exit status 1 if not even the ratios are valid"
+HELP = "estimate spring and friction from a recording; exit status 1 if nothing is valid"
 EXAMPLE = "positioner estimate rec.csv --json estimated.json"
 
 
@@ -19,10 +19,13 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
     parser.add_argument("recording", type=Path, metavar="REC", help="a recording, CSV or Parquet")
     parser.add_argument("--json", type=Path, metavar="FILE", help="write the numbers as JSON")
     parser.add_argument(
-        "--noise-m", type=float, metavar="M", help="standard deviation of the position's noise (else measured)"
+        "--noise-m",
+        type=float,
+        metavar="M",
+        help="standard deviation of the position's noise (measured in the recording)",
     )
     parser.add_argument(
-        "--pressure", choices=("held", "linear"), help="the pressure between samples: held or linear (the likelier one)"
+        "--pressure", choices=("held", "linear"), help="how the pressure goes between samples (the likelier of both)"
     )
     add_export_arguments(parser)
 

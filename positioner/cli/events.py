@@ -10,7 +10,7 @@ from positioner.cli.parts.config_argument import add_config, config_file
 if TYPE_CHECKING:
     from positioner.history import HistoryReader
 
-HELP = "print what has happened: events, or writes with peer and role, from the history of a daemon"
+HELP = "print the history of a daemon: events, or writes with their sender and role"
 EXAMPLE = "positioner events daemon.toml --since 2h --follow"
 
 FOLLOW_EVERY_S = 0.5
@@ -23,11 +23,11 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
     add_config(parser, metavar="CONFIG.toml|FILE", text="the daemon's file, or its history.sqlite or its folder")
     parser.add_argument("--valve", metavar="NAME", help="only of this valve")
     parser.add_argument(
-        "--since", type=_since, metavar="TIME", help="only from then on: 30m, 2h, 7d ago, or 2026-03-01T06:00 (UTC)"
+        "--since", type=_since, metavar="TIME", help="begin there: 30m, 2h or 7d ago, or 2026-03-01T06:00 (UTC)"
     )
     parser.add_argument("--limit", type=_count, metavar="N", help="only the newest N")
     parser.add_argument("--table", choices=TABLES, default="events", help="what to print (events)")
-    parser.add_argument("--follow", action="store_true", help="go on printing what is new, until Ctrl-C")
+    parser.add_argument("--follow", action="store_true", help="print new entries until Ctrl-C")
     parser.add_argument("--json", action="store_true", help="print a JSON object a line")
 
 
@@ -101,7 +101,7 @@ def _in_words(entry: Any) -> str:
     from positioner.history.entries import Event, Write
 
     if isinstance(entry, Event):
-        return _joined(
+        return _join_printable(
             f"{_clock(entry.time_s)}  {entry.number:6}  {entry.valve}",
             f"{Ne107Status(entry.ne107).text:15}",
             entry.words,
@@ -109,8 +109,10 @@ def _in_words(entry: Any) -> str:
     if isinstance(entry, Write):
         who = f"{entry.who} ({entry.role}) at {entry.peer}" if entry.who else entry.peer
         times = f" ({entry.times} times until {_clock(entry.end_s)})" if entry.times > 1 else ""
-        return _joined(_clock(entry.begin_s), entry.valve or "-", who, f"{entry.what} {entry.text}".rstrip() + times)
-    return _joined(*_plain(entry))
+        return _join_printable(
+            _clock(entry.begin_s), entry.valve or "-", who, f"{entry.what} {entry.text}".rstrip() + times
+        )
+    return _join_printable(*_plain(entry))
 
 
 def _plain(entry: Any) -> Iterator[str]:
@@ -123,7 +125,7 @@ def _plain(entry: Any) -> Iterator[str]:
             yield f"{name} {value:.6g}" if isinstance(value, float) else f"{name} {value}"
 
 
-def _joined(*parts: str) -> str:
+def _join_printable(*parts: str) -> str:
     """Return one line of them, whatever a client has called itself: no control character leaves it."""
     line = "  ".join(parts)
     return "".join(each if each.isprintable() else "?" for each in line)

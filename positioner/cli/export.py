@@ -3,13 +3,13 @@
 import argparse
 from pathlib import Path
 
-HELP = "write a valve for other simulators: a co-simulation FMU (FMI 2.0)"
+HELP = "write a valve for other simulators, as an FMU (FMI 2.0, co-simulation)"
 EXAMPLE = "positioner export fmu seed -o valve.fmu"
 
 
 def add_arguments(parser: argparse.ArgumentParser) -> None:
     """Declare the command line."""
-    parser.add_argument("format", choices=["fmu"], help="what is written")
+    parser.add_argument("format", choices=["fmu"], help="the format")
     parser.add_argument("valve", metavar="VALVE.toml", help="a valve file, or the name of a shipped valve")
     parser.add_argument("-o", "--out", type=Path, required=True, metavar="VALVE.fmu")
 

@@ -8,7 +8,7 @@ from positioner.cli.parts.noise_argument import add_noise_argument, noise_said
 from positioner.cli.parts.output_files import writable, write_json
 from positioner.cli.parts.pressure_argument import add_pressure_argument
 
-HELP = "add effects to a valve file, refit it, and print the held-out error before and after"
+HELP = "add effects to a valve file, fit it, and print the error before and after"
 EXAMPLE = "positioner extend seed --effect backlash --fit rec.csv -o new.toml"
 
 
@@ -20,15 +20,18 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
         nargs="+",
         default=[],
         metavar="NAME",
-        help="effects to add; one of your own by its .py file; without: refit the valve as it is",
+        help="effects to add, or .py files of your own (none: fit the valve as it is)",
     )
     parser.add_argument("--fit", type=Path, nargs="+", required=True, metavar="REC", help="one or several recordings")
     parser.add_argument(
-        "--test", type=Path, metavar="REC", help="recording held out, to judge by (the last third of the others)"
+        "--test",
+        type=Path,
+        metavar="REC",
+        help="a recording that judges and is not fitted (the last third of the others)",
     )
     parser.add_argument("-o", "--out", type=Path, required=True, metavar="NEW.toml")
     parser.add_argument("--json", type=Path, metavar="FILE", help="write all numbers as JSON")
-    parser.add_argument("--report", type=Path, metavar="FILE.html", help="write the journal, to be read in a browser")
+    parser.add_argument("--report", type=Path, metavar="FILE.html", help="write the journal for a browser")
     add_pressure_argument(parser)
     add_noise_argument(parser)
     add_export_arguments(parser)

@@ -9,7 +9,7 @@ if TYPE_CHECKING:
     from workbench.fleet.examination import Examination
     from workbench.fleet.manifest import Entry
 
-HELP = "rank many valves by their recordings; exit status 1 if one deserves a look, or nothing is known of it"
+HELP = "rank many valves by their recordings; exit status 1 if a valve needs attention or is unknown"
 EXAMPLE = "positioner fleet plant.csv --out fleet-out --report fleet.html"
 
 
@@ -23,25 +23,25 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
         metavar="FOLDER",
         help="folder of examinations and tables (fleet-out)",
     )
-    parser.add_argument("--scheduler", metavar="tcp://HOST:PORT", help="a Dask scheduler (workers of this machine)")
-    parser.add_argument("--workers", type=int, metavar="N", help="how many of these (one a core)")
+    parser.add_argument("--scheduler", metavar="tcp://HOST:PORT", help="a Dask scheduler (this machine)")
+    parser.add_argument("--workers", type=int, metavar="N", help="number of processes (one a core)")
     parser.add_argument(
         "--time-limit-s",
         type=float,
         default=900.0,
         metavar="S",
-        help="for one recording; one that takes longer is listed (900)",
+        help="time limit of one recording (900)",
     )
-    parser.add_argument("--report", type=Path, metavar="FILE.html", help="write the ranking as a page")
+    parser.add_argument("--report", type=Path, metavar="FILE.html", help="write the ranking for a browser")
     parser.add_argument(
         "--diagnoses",
         type=int,
         default=10,
         metavar="N",
-        help="how many diagnosis reports the page links to, the gravest first (10)",
+        help="number of diagnosis reports with links, the gravest first (10)",
     )
-    parser.add_argument("--since", metavar="DATE", help="say what changed of the valves since then")
-    parser.add_argument("--picture", type=Path, metavar="FILE.png", help="draw what changed since then")
+    parser.add_argument("--since", metavar="DATE", help="print what changed since that day")
+    parser.add_argument("--picture", type=Path, metavar="FILE.png", help="with --since: draw it")
 
 
 def run(arguments: argparse.Namespace) -> int:

@@ -4,7 +4,7 @@ import argparse
 
 from positioner.cli.parts.daemon_address import add_connection, connected
 
-HELP = "read supervisory registers by name (all of them without a name)"
+HELP = "read registers of a running daemon, by name (without a name: all)"
 EXAMPLE = "positioner get position state fault"
 
 

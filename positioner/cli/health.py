@@ -8,7 +8,7 @@ from positioner.cli.parts.daemon_address import add_connection, connected
 if TYPE_CHECKING:
     from positioner.daemon.health.operation import OperationDay
 
-HELP = "print a valve's NE 107 status, wear and today's figures; the days before from the file that --config names"
+HELP = "print NE 107 status, wear and today's figures of a valve; with --config also those of earlier days"
 EXAMPLE = "positioner health --config daemon.toml"
 
 FIGURES = (

@@ -5,27 +5,29 @@ from collections.abc import Mapping
 from pathlib import Path
 from typing import Any
 
-HELP = "make recordings of a valve with a hidden effect, and seal the answer; or reveal it"
+HELP = "make recordings of a valve with a hidden effect, to practise; --reveal prints the answer"
 EXAMPLE = "positioner hide --seed 7 -o blind && positioner diagnose blind/fit.csv --valve blind/valve.toml"
 
-LEAST_SAMPLES = 1000
+LEAST_SAMPLES = 1000  # fewer do not show one of each effect
 
 
 def add_arguments(parser: argparse.ArgumentParser) -> None:
     """Declare the command line."""
-    parser.add_argument("--seed", type=int, metavar="N", help="seed of all that is drawn")
+    parser.add_argument("--seed", type=int, metavar="N", help="seed of the random valve")
     parser.add_argument(
-        "-o", "--out", type=Path, metavar="DIR", help="where fit.csv, test.csv, valve.toml and sealed.json go"
+        "-o", "--out", type=Path, metavar="DIR", help="folder for fit.csv, test.csv, valve.toml and sealed.json"
     )
-    parser.add_argument("--effects", type=int, choices=(0, 1, 2), default=1, help="how many effects are hidden (1)")
+    parser.add_argument("--effects", type=int, choices=(0, 1, 2), default=1, help="number of hidden effects (1)")
     parser.add_argument(
         "--dirty",
         action="store_true",
-        help="with pressure noise, break-away forces that vary, and a 12-bit transmitter",
+        help="with pressure noise, scattered break-away and a 12-bit transmitter",
     )
-    parser.add_argument("--duration-s", type=float, default=30.0, help="of each recording (30)")
-    parser.add_argument("--period-s", type=float, default=0.01, help="between samples (0.01)")
-    parser.add_argument("--reveal", type=Path, metavar="DIR", help="check the seal of a folder and print the answer")
+    parser.add_argument("--duration-s", type=float, default=30.0, help="length of each recording (30)")
+    parser.add_argument("--period-s", type=float, default=0.01, help="time between samples (0.01)")
+    parser.add_argument(
+        "--reveal", type=Path, metavar="DIR", help="print the answer of a folder, after a check of its seal"
+    )
 
 
 def run(arguments: argparse.Namespace) -> int:
@@ -76,7 +78,7 @@ def _print_answer(sha256: str, answer: Mapping[str, Any]) -> None:
     if not answer["effects"]:
         print("hidden: nothing")
     for effect in answer["effects"]:
-        print(f"hidden: {_listed(effect)}")
+        print(f"hidden: {_list_values(effect)}")
         seen = answer["visible"][effect["name"]]
         is_visible = "visible" if seen["is_visible"] else "not visible"
         print(
@@ -85,9 +87,9 @@ def _print_answer(sha256: str, answer: Mapping[str, Any]) -> None:
         )
     floor = answer["floor_m"]
     print(f"floor: {1e3 * floor['fit']:.3g} mm and {1e3 * floor['test']:.3g} mm rms, what the true valve itself misses")
-    print(f"valve: {_listed(answer['valve'])}")
+    print(f"valve: {_list_values(answer['valve'])}")
 
 
-def _listed(table: Mapping[str, Any]) -> str:
+def _list_values(table: Mapping[str, Any]) -> str:
     rest = (f"{key} = {value:.4g}" for key, value in table.items() if key != "name")
     return ", ".join([str(table["name"]), *rest])

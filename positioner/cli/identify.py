@@ -8,7 +8,7 @@ from positioner.cli.parts.daemon_address import add_connection, connected
 if TYPE_CHECKING:
     from positioner.dcs import Dcs
 
-HELP = "identify the valve (moves it: state S3); the mode must be automatic"
+HELP = "measure spring and friction of the valve (moves the valve); the mode must be automatic"
 EXAMPLE = "positioner identify"
 
 
@@ -17,10 +17,10 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
     parser.add_argument(
         "--alpha-pa",
         type=float,
-        help="constant part of a sine ([excitation] kind), Pa; 0 keeps the stem",
+        help="for [excitation] kind = sine: its mean pressure, Pa; 0 is the pressure that holds the stem",
     )
-    parser.add_argument("--beta-pa", type=float, help="amplitude of its sine, Pa")
-    parser.add_argument("--omega-rad-per-s", type=float, help="angular frequency of its sine, rad/s")
+    parser.add_argument("--beta-pa", type=float, help="for a sine: its amplitude, Pa")
+    parser.add_argument("--omega-rad-per-s", type=float, help="for a sine: its angular frequency, rad/s")
     parser.add_argument("--timeout-s", type=float, default=600.0, help="give up after this many seconds (600)")
     add_connection(parser)
 
@@ -61,10 +61,10 @@ def _report(dcs: "Dcs", problem: str | None) -> int:
         return 1
     law = dcs.get_all("b_over_c_applied", "k_over_c_applied", "offset_applied", "sampling", "ne107_causes_high")
     if law["sampling"]:
-        print(f"\n[device] sampling, found out: {Sampling(int(law['sampling'])).text}")
+        print(f"\n[device] sampling, as found: {Sampling(int(law['sampling'])).text}")
     if int(law["ne107_causes_high"]) >> (Ne107Cause.ONE_DIRECTION - 17) & 1:
-        print("\none direction is identified: k/c holds there alone until the stem has landed the other way")
-    print("\napplied; over a restart [memory] folder in the daemon's file keeps it, or without that:")
+        print("\none direction is identified: k/c holds there alone until the stem has moved the other way")
+    print("\napplied. [memory] folder in the daemon's file keeps it over a restart; without it, copy:")
     print(f"[law]\nb_over_c_pa_per_m = {law['b_over_c_applied']:.7g}")
     print(f"k_over_c_pa = {law['k_over_c_applied']:.7g}")
     if law["offset_applied"]:

@@ -5,7 +5,7 @@ from pathlib import Path
 
 from positioner.cli.parts.export_arguments import add_export_arguments, export_options, read_mapped, take_mapping
 
-HELP = "list what an export holds and the words that read it; with --column, say what is read, and write it with -o"
+HELP = "read a file of another program: list its columns and propose options; with -o write a recording"
 EXAMPLE = (
     "positioner import trend.csv --column time_s=Time --column position_m=PV:mm --column command_pa=OUT:bar -o rec.csv"
 )
@@ -14,7 +14,7 @@ EXAMPLE = (
 def add_arguments(parser: argparse.ArgumentParser) -> None:
     """Declare the command line."""
     kinds = "CSV, .xlsx, .mat, HDF5, TDMS, MDF4, Parquet"
-    parser.add_argument("file", type=Path, metavar="FILE", help=f"an export: {kinds}; or a recording")
+    parser.add_argument("file", type=Path, metavar="FILE", help=f"the file: {kinds}, or a recording")
     parser.add_argument("-o", "--out", type=Path, metavar="REC.csv", help="write the recording")
     add_export_arguments(parser)
 

@@ -6,16 +6,16 @@ from pathlib import Path
 from positioner.cli.parts.loop_arguments import add_loop_arguments, read_record
 from positioner.cli.parts.output_files import writable, write_json
 
-HELP = "say whether a loop's valve sticks, from OP, PV and SP alone; exit status 1 where it does or cannot be told"
+HELP = "tell from OP, PV and SP alone whether a valve sticks; exit status 1 if it sticks or is undecided"
 EXAMPLE = "positioner loop FIC101.csv --report loop.html"
 
 
 def add_arguments(parser: argparse.ArgumentParser) -> None:
     """Declare the command line."""
     parser.add_argument("recording", type=Path, nargs="+", metavar="REC", help="a historian's export: time, OP, PV, SP")
-    parser.add_argument("--together", action="store_true", help="the records are of one valve: their evidence is added")
-    parser.add_argument("--json", type=Path, metavar="FILE", help="write what was found as JSON, a list")
-    parser.add_argument("--report", type=Path, metavar="FILE.html", help="write it as a page")
+    parser.add_argument("--together", action="store_true", help="all files are of one valve: add their evidence")
+    parser.add_argument("--json", type=Path, metavar="FILE", help="write the result as JSON")
+    parser.add_argument("--report", type=Path, metavar="FILE.html", help="write a report for a browser")
     add_loop_arguments(parser)
 
 

@@ -1,6 +1,6 @@
 """`positioner COMMAND ...`: finds the command, runs it, turns bad input into one line and an exit status.
 
-Exit status: 0 done, 1 the thing asked about does not hold, 2 bad input, or an output that cannot be written; 130 and
+Exit status: 0 done or yes, 1 no (each command says what), 2 bad input, or an output that cannot be written; 130 and
 141, as shells have it, when broken off by Ctrl-C and when nobody reads what is printed any more (`| head`).
 """
 
@@ -26,7 +26,7 @@ def main(words: Sequence[str] | None = None) -> int:
         if said := in_the_way():
             print(f"positioner: {said}", file=sys.stderr)
             return 2
-        return _done(words)
+        return _run_command(words)
     except KeyboardInterrupt:
         gc.freeze()  # else the interpreter looks through all that is left before it ends: half a second
         return 130
@@ -37,7 +37,7 @@ def main(words: Sequence[str] | None = None) -> int:
         return 2
 
 
-def _done(words: Sequence[str] | None) -> int:
+def _run_command(words: Sequence[str] | None) -> int:
     """Run one command, now that what it imports is known to be ours."""
     from config.errors import CommandFailed, InputError
     from config.extras import told
@@ -141,7 +141,7 @@ def command_parser(words: Sequence[str] = ()) -> argparse.ArgumentParser:
     parser = OneLine(
         prog="positioner",
         description="Identifies and positions sticking pneumatic control valves over fieldbus.",
-        epilog="exit status: 0 done, 1 the thing asked about does not hold, 2 bad input",
+        epilog="exit status: 0 done or yes, 1 no (each command says what), 2 bad input",
     )
     parser.add_argument("--version", action="version", version=f"positioner {version('positioner')}")
     commands = parser.add_subparsers(dest="command", metavar="COMMAND", required=True)

@@ -7,7 +7,7 @@ from typing import TYPE_CHECKING
 if TYPE_CHECKING:
     from config.registers import Register
 
-HELP = "print the supervisory register map"
+HELP = "print the map of the registers, or the configuration of a program that reads them"
 EXAMPLE = "positioner map --format md"
 
 FOR_OTHERS = ("telegraf", "modbus-exporter", "home-assistant", "node-red")
@@ -24,10 +24,12 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
         "--format",
         choices=("md", "csv", "json", *FOR_OTHERS, "eds"),
         default="md",
-        help="md, csv, json: the map; eds: the simulated CANopen device; else: a program's configuration",
+        help="md, csv, json: the map; eds: the simulated CANopen device; others: the configuration of that program",
     )
-    parser.add_argument("--config", type=Path, metavar="CONFIG.toml", help="the daemon's file, for a configuration")
-    parser.add_argument("--reasons", action="store_true", help="print what the numbers in *_reason mean instead")
+    parser.add_argument(
+        "--config", type=Path, metavar="CONFIG.toml", help="the daemon's file, for the configuration of a program"
+    )
+    parser.add_argument("--reasons", action="store_true", help="print the meaning of the numbers in *_reason")
 
 
 def run(arguments: argparse.Namespace) -> int:

@@ -19,7 +19,7 @@ if TYPE_CHECKING:
     from positioner.daemon.snapshot import Snapshot
     from positioner.virtual.virtual_cycle import Script
 
-HELP = "run the closed loop in virtual time: identify, then follow a reference"
+HELP = "simulate valve and controller faster than time: identify, then follow a reference"
 EXAMPLE = "positioner play seed --reference reference.csv --noise-m 1e-5 -o run.csv"
 
 IDENTIFY_S = 1.5
@@ -31,17 +31,19 @@ ROUNDING_S = 1e-9
 def add_arguments(parser: argparse.ArgumentParser) -> None:
     """Declare the command line."""
     parser.add_argument("valve", metavar="VALVE.toml", help="a valve file, or the name of a shipped valve")
-    parser.add_argument("--reference", type=Path, required=True, metavar="REF.csv", help="time_s, reference_m")
+    parser.add_argument(
+        "--reference", type=Path, required=True, metavar="REF.csv", help="columns time_s and reference_m"
+    )
     parser.add_argument("--law", choices=law_names(), default=DEFAULT_LAW, help=f"the control law ({DEFAULT_LAW})")
     parser.add_argument(
         "--extended",
         type=Path,
         metavar="VALVE.toml",
-        help="play twice, without this valve file and with it known to the law; print both errors",
+        help="run twice, without and with this valve file in the law; print both errors",
     )
-    parser.add_argument("--period-s", type=float, default=1e-3, help="period of the loop (1e-3)")
-    parser.add_argument("--noise-m", type=float, default=0.0, help="white sensor noise, standard deviation (0)")
-    parser.add_argument("--seed", type=int, default=0, help="of the noise (0)")
+    parser.add_argument("--period-s", type=float, default=1e-3, help="period of the control loop (1e-3)")
+    parser.add_argument("--noise-m", type=float, default=0.0, help="standard deviation of the sensor's noise (0)")
+    parser.add_argument("--seed", type=int, default=0, help="seed of the noise (0)")
     parser.add_argument("-o", "--out", type=Path, required=True, metavar="REC.csv")
 
 

@@ -9,7 +9,7 @@ if TYPE_CHECKING:
     from config.daemon_file import DaemonFile
     from drivers.boundary import Driver, Reading
 
-HELP = "read the valve once a second: bus rate, age, plausibility; moves nothing"
+HELP = "print one measurement a second, with its age and whether it is plausible; moves nothing"
 EXAMPLE = "positioner probe daemon.toml --count 5"
 
 BURST = 50
@@ -19,8 +19,8 @@ BURST = 50
 def add_arguments(parser: argparse.ArgumentParser) -> None:
     """Declare the command line."""
     add_config(parser)
-    parser.add_argument("--valve", help="which of the file's valves, by its name")
-    parser.add_argument("--count", type=int, default=0, help="stop after this many lines (0: at Ctrl-C)")
+    parser.add_argument("--valve", help="name of the valve, where the file has several")
+    parser.add_argument("--count", type=int, default=0, help="number of lines (0: until Ctrl-C)")
 
 
 def run(arguments: argparse.Namespace) -> int:

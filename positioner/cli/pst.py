@@ -17,7 +17,7 @@ if TYPE_CHECKING:
     from positioner.tests_on_the_valve.credit import Credit
     from positioner.tests_on_the_valve.partial_stroke import PartialStroke
 
-HELP = "partial stroke test: break-out, friction, travel, times against a reference (moves it: state S3)"
+HELP = "test: a partial stroke, with break-out, friction and times against a reference (moves the valve)"
 EXAMPLE = "positioner pst site.toml --travel 0.1 --against as_left"
 
 DAYS_A_YEAR = 365.25
@@ -26,21 +26,28 @@ DAYS_A_YEAR = 365.25
 def add_arguments(parser: argparse.ArgumentParser) -> None:
     """Declare the command line."""
     add_test_arguments(parser, recordings=False)
-    _add_share(parser, "--travel", 0.1, "how far it is moved, of the stroke (0.1)")
-    _add_share(parser, "--beyond", 0.05, "how much farther, before it is broken off (0.05)")
-    _add_share(parser, "--least", None, "how far it must go to pass (0.8 of --travel)")
-    _add_share(parser, "--start", 0.005, "motion that counts as a break-out (0.005)")
-    parser.add_argument("--towards", choices=("open", "closed"), help="which way (away from the nearer end)")
-    parser.add_argument("--step", action="store_true", help="as fast as the rate limit permits, in place of a ramp")
-    parser.add_argument("--threshold-pa", type=float, metavar="PA", help="the command is never taken beyond")
+    _add_share(parser, "--travel", 0.1, "travel of the test, share of the stroke (0.1)")
+    _add_share(parser, "--beyond", 0.05, "more travel than that ends the test (0.05)")
+    _add_share(parser, "--least", None, "least travel to pass (0.8 of --travel)")
+    _add_share(parser, "--start", 0.005, "travel that counts as break-out (0.005)")
+    parser.add_argument("--towards", choices=("open", "closed"), help="direction (away from the nearer end)")
+    parser.add_argument("--step", action="store_true", help="step at the rate limit in place of a ramp")
+    parser.add_argument("--threshold-pa", type=float, metavar="PA", help="the command stays within this pressure")
     parser.add_argument(
-        "--failure-rate-per-h", type=float, metavar="RATE", help="dangerous undetected: says the credit"
+        "--failure-rate-per-h",
+        type=float,
+        metavar="RATE",
+        help="dangerous undetected failures; prints PFD_avg with and without the test",
     )
-    _add_share(parser, "--partial-coverage", 0.6, "of these failures it shows (0.6)")
-    _add_share(parser, "--proof-coverage", 0.9, "of them the proof test shows (0.9)")
-    parser.add_argument("--every-days", type=float, default=30.0, metavar="DAYS", help="how often this is done (30)")
-    parser.add_argument("--proof-every-years", type=float, default=5.0, metavar="YEARS", help="the proof test (5)")
-    parser.add_argument("--life-years", type=float, default=20.0, metavar="YEARS", help="of the valve (20)")
+    _add_share(parser, "--partial-coverage", 0.6, "share of these failures that the partial stroke shows (0.6)")
+    _add_share(parser, "--proof-coverage", 0.9, "share that the proof test shows (0.9)")
+    parser.add_argument(
+        "--every-days", type=float, default=30.0, metavar="DAYS", help="interval of the partial stroke test (30)"
+    )
+    parser.add_argument(
+        "--proof-every-years", type=float, default=5.0, metavar="YEARS", help="interval of the proof test (5)"
+    )
+    parser.add_argument("--life-years", type=float, default=20.0, metavar="YEARS", help="life of the valve (20)")
 
 
 def _add_share(parser: argparse.ArgumentParser, option: str, default: float | None, text: str) -> None:

@@ -7,22 +7,22 @@ from pathlib import Path
 from positioner.cli.parts.config_argument import add_config, config_file
 from positioner.cli.parts.output_files import writable, write_text
 
-HELP = "as found and as left of a valve: figures recommended, measured and changed, in one HTML or PDF file"
+HELP = "write the report of a valve as found and as left: one HTML or PDF file"
 EXAMPLE = "positioner report site.toml -o FV-101.html --recommended seat_load_n=1200"
 
 
 def add_arguments(parser: argparse.ArgumentParser) -> None:
     """Declare the command line."""
     add_config(parser)
-    parser.add_argument("--valve", dest="name", metavar="NAME", help="which of that file's valves")
+    parser.add_argument("--valve", dest="name", metavar="NAME", help="name of the valve, where the file has several")
     parser.add_argument(
         "--recommended",
         nargs="+",
         default=[],
         metavar="FIGURE=VALUE",
-        help="what figures should be, SI, by name",
+        help="recommended figures, by name, in SI units",
     )
-    parser.add_argument("-o", dest="out", type=Path, required=True, metavar="FILE", help="where: .html or .pdf")
+    parser.add_argument("-o", dest="out", type=Path, required=True, metavar="FILE", help="the report, .html or .pdf")
 
 
 def run(arguments: argparse.Namespace) -> int:

@@ -6,7 +6,7 @@ from pathlib import Path
 from positioner.cli.parts.export_arguments import add_export_arguments, read_any
 from positioner.cli.parts.output_files import writable, write_json
 
-HELP = "print step-response figures of a recording by their trade names; exit status 1 if it holds no step"
+HELP = "print dead time, T63, T86, dead band and so on of a recording; exit status 1 if it holds no step"
 EXAMPLE = "positioner response rec.csv --json figures.json"
 
 

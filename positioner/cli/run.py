@@ -4,7 +4,7 @@ import argparse
 
 from positioner.cli.parts.config_argument import add_config, config_file
 
-HELP = "run the daemon: position the valves of CONFIG.toml and serve their supervisory registers"
+HELP = "run the daemon: position the valves of CONFIG.toml and serve their registers to the DCS"
 EXAMPLE = "positioner run daemon.toml"
 
 

@@ -4,7 +4,7 @@ import argparse
 
 from positioner.cli.parts.daemon_address import add_connection, connected
 
-HELP = "write a supervisory register by name"
+HELP = "write a register of a running daemon"
 EXAMPLE = "positioner set reference 0.5"
 
 

@@ -13,7 +13,7 @@ from positioner.cli.parts.valve_test import (
     require_whole_travel,
 )
 
-HELP = "friction, spring rate, bench set, seat load of the valve, by slow ramps over its travel (moves it: state S3)"
+HELP = "test: friction, spring rate, bench set and seat load, by slow ramps over the travel (moves the valve)"
 EXAMPLE = "positioner signature site.toml --area-m2 0.07 --keep as_left"
 
 

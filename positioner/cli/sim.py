@@ -6,7 +6,7 @@ import time
 
 from positioner.cli.parts.config_argument import add_config, config_file
 
-HELP = "run a simulated valve as a device on a bus; print its address, HOST:PORT, when it listens"
+HELP = "run a simulated valve as a device on a bus; prints its address when it is ready"
 EXAMPLE = "positioner sim config/profiles/slave.toml --listen-port 0"
 CATCH_UP_EVERY_S = 0.02
 
@@ -18,7 +18,7 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
         "--listen-port",
         type=_port,
         metavar="N",
-        help="port, or loopback CAN channel, in place of the file's; 0 takes a free one",
+        help="port, or loopback CAN channel, in place of that of the file; 0 takes a free one",
     )
 
 

@@ -3,7 +3,7 @@
 import argparse
 from pathlib import Path
 
-HELP = "record the model's answer to a series of pressures, open loop, without a bus"
+HELP = "simulate the stem under a series of pressures, without a controller"
 EXAMPLE = "positioner simulate seed.toml --input pressure.csv --noise-m 1e-5 -o answer.csv"
 
 
@@ -15,11 +15,11 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
         type=Path,
         required=True,
         metavar="PRESSURE.csv",
-        help="time_s, command_pa: each pressure holds until the next time; of a valve with a positioner, reference_m",
+        help="columns time_s and command_pa; each pressure holds until the next row (with a positioner: reference_m)",
     )
     parser.add_argument("-o", "--out", type=Path, required=True, metavar="REC.csv")
-    parser.add_argument("--noise-m", type=float, default=0.0, help="white sensor noise, standard deviation (0)")
-    parser.add_argument("--seed", type=int, default=0, help="of the noise (0)")
+    parser.add_argument("--noise-m", type=float, default=0.0, help="standard deviation of the sensor's noise (0)")
+    parser.add_argument("--seed", type=int, default=0, help="seed of the noise (0)")
 
 
 def run(arguments: argparse.Namespace) -> int:

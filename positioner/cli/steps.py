@@ -12,7 +12,7 @@ from positioner.cli.parts.valve_test import (
     recordings_of,
 )
 
-HELP = "dead band, resolution and step response by small steps of the command (moves it: state S3)"
+HELP = "test: dead band, resolution and step response, by small steps (moves the valve)"
 EXAMPLE = "positioner steps site.toml --held-s 2"
 
 AT_AN_END = 0.05
@@ -23,10 +23,12 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
     """Declare the command line."""
     add_test_arguments(parser, recordings=False)
     parser.add_argument(
-        "--dead-band-pa", type=float, metavar="PA", help="as expected (twice the friction that is known)"
+        "--dead-band-pa", type=float, metavar="PA", help="expected dead band (twice the known friction)"
     )
-    parser.add_argument("--held-s", type=float, default=0.8, metavar="S", help="how long each step is held (0.8)")
-    parser.add_argument("--most", type=float, default=0.3, metavar="SHARE", help="travel that breaks it off (0.3)")
+    parser.add_argument("--held-s", type=float, default=0.8, metavar="S", help="time of each step (0.8)")
+    parser.add_argument(
+        "--most", type=float, default=0.3, metavar="SHARE", help="travel that stops the test, share of the stroke (0.3)"
+    )
 
 
 def run(arguments: argparse.Namespace) -> int:

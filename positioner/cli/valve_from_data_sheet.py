@@ -3,7 +3,7 @@
 import argparse
 from pathlib import Path
 
-HELP = "write a valve file from a data sheet (area, bench range, stroke; says what it assumes), or --of another"
+HELP = "write a valve file from a data sheet; prints what it assumes"
 EXAMPLE = "positioner valve --area-cm2 700 --range-bar 0.2 1.0 --stroke-mm 40 -o v.toml"
 
 
@@ -15,29 +15,27 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
         type=float,
         nargs=2,
         metavar=("CLOSED", "OPEN"),
-        help="bench range: gauge pressures at which the stem leaves one end and reaches the other",
+        help="bench range: gauge pressures at both ends of the travel",
     )
     parser.add_argument("--stroke-mm", type=float, metavar="MM", help="rated travel")
     parser.add_argument(
         "--friction-percent",
         type=float,
         metavar="F",
-        help="pressure between opening and closing, of the range (5; PTFE 2-6, graphite 5-15)",
+        help="pressure between opening and closing, %% of the range (5; PTFE 2-6, graphite 5-15)",
     )
     parser.add_argument("--breakaway-ratio", type=float, metavar="R", help="break-away over sliding friction (1.3)")
     parser.add_argument("--mass-kg", type=float, metavar="KG", help="plate, stem and plug (8 kg at 700 cm2)")
     parser.add_argument("--name", default="from data sheet", help="of the valve")
-    parser.add_argument(
-        "--of", metavar="VALVE.toml", help="another valve file, or a shipped valve's name, to be changed"
-    )
+    parser.add_argument("--of", metavar="VALVE.toml", help="begin with this valve file, or a shipped valve's name")
     parser.add_argument(
         "--set",
         nargs="+",
         default=[],
         metavar="NAME=VALUE",
-        help="with --of: a parameter, SI units, as coulomb_n=1300 or preload.force_n=467",
+        help="with --of: change a parameter (SI units), as coulomb_n=1300 or preload.force_n=467",
     )
-    parser.add_argument("--without", nargs="+", default=[], metavar="EFFECT", help="with --of: effects left out")
+    parser.add_argument("--without", nargs="+", default=[], metavar="EFFECT", help="with --of: leave these effects out")
     parser.add_argument("-o", "--out", type=Path, required=True, metavar="V.toml")
 
 

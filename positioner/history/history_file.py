@@ -25,7 +25,7 @@ APPLICATION = 0x504F5331
 VERSION = 1
 """Of the tables; a change of `entries` has the next."""
 COLUMN_TYPES = {str: "TEXT", int: "INTEGER", float: "REAL"}
-ALWAYS_KEPT = 1000
+ALWAYS_KEPT = 1000  # newest rows of a table, whatever the clock says
 FULL_SHARE = 0.9
 """Of the limit, above which the oldest goes: the write-ahead log needs room, too."""
 BEYOND_IDS = ("-wal", "-shm")

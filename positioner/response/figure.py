@@ -17,9 +17,9 @@ import numpy as np
 
 from config.recording import Column
 
-MANY = 8
+FEWEST_PARABOLA_SAMPLES = 8
 """Samples between, from which the parabola is more certain than the gaps."""
-BAND = 3.0
+CROSSING_SIGMA = 3.0
 """Half width, in standard deviations of the noise, of what counts as crossing a level."""
 
 
@@ -59,11 +59,11 @@ def level_crossing(time_s: Column, rising: Column, level: float, noise: float) -
     >>> round(level_crossing(t, t, 0.632, 0.0).time_s, 3)
     0.632
     """
-    above = rising >= level + BAND * noise
+    above = rising >= level + CROSSING_SIGMA * noise
     if not above.any():
         return None
     end = int(above.argmax())
-    below = np.flatnonzero(rising[:end] <= level - BAND * noise)
+    below = np.flatnonzero(rising[:end] <= level - CROSSING_SIGMA * noise)
     start = int(below[-1]) if below.size else 0
     if start == end:
         return None
@@ -71,7 +71,7 @@ def level_crossing(time_s: Column, rising: Column, level: float, noise: float) -
     steps_s = np.diff(t)
     gap_s = float(steps_s.max())
     crossing_s = float(t[0] + np.sum(steps_s * _share_below(y, level)))
-    fitted = _by_parabola(t[1:-1], y[1:-1], level, noise, crossing_s) if len(t) >= MANY + 2 else None
+    fitted = _by_parabola(t[1:-1], y[1:-1], level, noise, crossing_s) if len(t) >= FEWEST_PARABOLA_SAMPLES + 2 else None
     crossing_s, plus_minus_s = fitted or (crossing_s, gap_s / 2)
     return LevelCrossing(crossing_s, plus_minus_s, gap_s)
 

@@ -27,7 +27,7 @@ from positioner.response.figure import Figure, LevelCrossing, level_crossing, un
 from positioner.response.rest_level import RestLevel, rest_at_the_end
 from positioner.response.step_detection import StepChange
 
-T63, T86 = 0.632, 0.865
+T63, T86 = 0.632, 0.865  # shares of the travel, ISA-75.25.01
 OBSERVABLE_SIGMA = 5.0
 OBSERVABLE_PERCENT = 0.5
 SMALLEST_SIGMA = 25.0

@@ -20,7 +20,7 @@ from drivers.boundary import DriverError
 from positioner.dcs import Dcs
 
 HOST = "127.0.0.1"
-WITHIN_S = 20.0
+AGENT_WITHIN_S = 20.0
 """A reply that a busy machine gives later is none."""
 
 Calls = Mapping[str, Callable[..., Any]]
@@ -44,15 +44,15 @@ def daemon_calls(port: int) -> Calls:
     """Return what a daemon can be asked; each on a connection of its own, so that it may have been restarted."""
 
     def get(names: list[str]) -> dict[str, float]:
-        with Dcs(HOST, port, timeout_s=WITHIN_S) as dcs:
+        with Dcs(HOST, port, timeout_s=AGENT_WITHIN_S) as dcs:
             return dcs.get_all(*names)
 
     def write(values: dict[str, float | str]) -> None:
-        with Dcs(HOST, port, timeout_s=WITHIN_S) as dcs:
+        with Dcs(HOST, port, timeout_s=AGENT_WITHIN_S) as dcs:
             dcs.set_all({name: _number(name, value) for name, value in values.items()})
 
     def identify(excitation: dict[str, float], within_s: float) -> str | None:
-        with Dcs(HOST, port, timeout_s=WITHIN_S) as dcs:
+        with Dcs(HOST, port, timeout_s=AGENT_WITHIN_S) as dcs:
             return dcs.identify(excitation, within_s)
 
     return {"get": get, "set": write, "identify": identify}
@@ -69,7 +69,7 @@ def _number(name: str, value: float | str) -> float:
 
 def device_calls(port: int) -> Calls:
     """Return what a device can be asked; on one connection, opened when it is first needed."""
-    driver = driver_for(ModbusTcpDevice(host=HOST, port=port, reply_timeout_s=WITHIN_S))
+    driver = driver_for(ModbusTcpDevice(host=HOST, port=port, reply_timeout_s=AGENT_WITHIN_S))
     connected: list[float] = []
 
     def asked(what: Callable[[], Any]) -> Any:

@@ -16,7 +16,7 @@ from typing import Any
 from positioner.testing.forked import Forked, fork_server
 
 HOME = Path(__file__).resolve().parents[2]
-END_WITHIN_S = 10.0
+CHILD_END_WITHIN_S = 10.0
 
 
 class NotStarted(Exception):
@@ -96,7 +96,7 @@ class ChildProcess:
         """End it, at best as it is told to."""
         self._process.terminate()
         try:
-            self._process.wait(END_WITHIN_S)
+            self._process.wait(CHILD_END_WITHIN_S)
         except subprocess.TimeoutExpired:
             self.kill()
         self._out.close()

@@ -18,7 +18,7 @@ import time
 from contextlib import suppress
 from typing import Any
 
-LENGTH = 4
+LENGTH_BYTES = 4  # bytes before a message
 LOADED = (
     "positioner.cli.main",
     "positioner.daemon.service",
@@ -27,7 +27,7 @@ LOADED = (
     "sim.slave.modbus_slave",
     "sim.slave.loaded",
 )
-LOOK_EVERY_S = 0.005
+CHILD_LOOK_EVERY_S = 0.005
 
 
 def main(line: socket.socket) -> None:
@@ -56,7 +56,7 @@ def main(line: socket.socket) -> None:
 
 
 def _received(line: socket.socket) -> tuple[dict[str, Any], list[int]] | None:
-    head, descriptors, _, _ = socket.recv_fds(line, LENGTH, 3)
+    head, descriptors, _, _ = socket.recv_fds(line, LENGTH_BYTES, 3)
     if not head:
         return None
     text = line.recv(int.from_bytes(head), socket.MSG_WAITALL)
@@ -64,7 +64,7 @@ def _received(line: socket.socket) -> tuple[dict[str, Any], list[int]] | None:
 
 
 def _say(line: socket.socket, answer: int) -> None:
-    line.sendall(answer.to_bytes(LENGTH))
+    line.sendall(answer.to_bytes(LENGTH_BYTES))
 
 
 def _has_ended(process: int, within_s: float, living: set[int]) -> bool:
@@ -76,7 +76,7 @@ def _has_ended(process: int, within_s: float, living: set[int]) -> bool:
         elif time.monotonic() > end_s:
             return False
         else:
-            time.sleep(LOOK_EVERY_S)
+            time.sleep(CHILD_LOOK_EVERY_S)
     return True
 
 

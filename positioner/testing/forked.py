@@ -17,7 +17,7 @@ from functools import cache
 from threading import Lock
 from typing import IO, Any
 
-from positioner.testing.fork_server import LENGTH
+from positioner.testing.fork_server import LENGTH_BYTES
 
 FOREVER_S = 1e9
 
@@ -80,9 +80,9 @@ class ForkServer:
         """Return the answer to a request."""
         text = json.dumps(request).encode()
         with self._one_at_a_time:
-            socket.send_fds(self._line, [len(text).to_bytes(LENGTH)], list(descriptors))
+            socket.send_fds(self._line, [len(text).to_bytes(LENGTH_BYTES)], list(descriptors))
             self._line.sendall(text)
-            return int.from_bytes(self._line.recv(LENGTH, socket.MSG_WAITALL))
+            return int.from_bytes(self._line.recv(LENGTH_BYTES, socket.MSG_WAITALL))
 
     def _end(self) -> None:
         self._line.close()

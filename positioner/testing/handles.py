@@ -12,7 +12,7 @@ from positioner.testing.child_process import Agent, ChildProcess, NotDone, port_
 
 AGENT, COMMANDS, PROXY = "positioner.testing.agent", "positioner.cli", "positioner.testing.fault_proxy"
 HOST = "127.0.0.1"
-POLL_S = 0.02
+HANDLE_POLL_S = 0.02
 
 
 @dataclass(frozen=True, slots=True)
@@ -134,7 +134,7 @@ class PositionerDaemon:
         end_s = time.monotonic() + within_s
         while not holds(value := self.get(name)):
             assert time.monotonic() < end_s, f"{name} was still {value:g} after {within_s:g} s"
-            time.sleep(POLL_S)
+            time.sleep(HANDLE_POLL_S)
         return value
 
     def log(self) -> list[dict[str, Any]]:

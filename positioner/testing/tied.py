@@ -12,7 +12,7 @@ import signal
 import sys
 from threading import Thread
 
-AT_ONCE = 1024
+READ_BYTES = 1024  # bytes
 
 
 def main(module: str) -> None:
@@ -23,7 +23,7 @@ def main(module: str) -> None:
 
 def _end_when_alone(heard: int) -> None:
     # Not by `sys.stdin`: whose lock a thread still holds, with that the interpreter does not end.
-    while os.read(heard, AT_ONCE):
+    while os.read(heard, READ_BYTES):
         pass
     os.kill(os.getpid(), signal.SIGTERM)
 

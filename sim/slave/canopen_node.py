@@ -35,7 +35,7 @@ from sim.slave.canopen_dictionary import (
 from sim.slave.clocks import Clock
 from sim.slave.simulated_device import Device
 
-ERROR_REGISTER, SYNC_ID, EMCY_ID, HEARTBEAT_MS = 0x1001, 0x1005, 0x1014, 0x1017
+ERROR_REGISTER, SYNC_ID, EMCY_ID, HEARTBEAT_MS = 0x1001, 0x1005, 0x1014, 0x1017  # objects of CiA 301
 COMMAND = SIMULATED_OBJECTS.command_pa.index
 
 
@@ -49,7 +49,7 @@ class Nmt(IntEnum):
 
 NO_TRANSFER = struct.pack("<BHBI", 0x80, 0, 0, 0x05040001)
 """SDO abort: command specifier not valid."""
-START, STOP, ENTER_PRE_OPERATIONAL, RESET_NODE, RESET_COMMUNICATION = 1, 2, 128, 129, 130
+START, STOP, ENTER_PRE_OPERATIONAL, RESET_NODE, RESET_COMMUNICATION = 1, 2, 128, 129, 130  # NMT commands of CiA 301
 
 
 class EmergencyCause(IntEnum):

@@ -17,7 +17,7 @@ from fieldbus.modbus.serial_line import SerialLine
 
 log = logging.getLogger(__name__)
 
-LOOK_EVERY_S = 0.05
+LINE_LOOK_EVERY_S = 0.05
 """How often an idle server looks whether it is to stop."""
 AGAIN_AFTER_S = 0.2
 """How long a server waits for a line that is gone."""
@@ -75,7 +75,7 @@ class RtuServer(RegisterAnswers):
 
     def _frame(self) -> bytes:
         """Return what came up to the next silence; b"" when nothing does for a while."""
-        frame = self._line.receive(time.monotonic() + LOOK_EVERY_S)
+        frame = self._line.receive(time.monotonic() + LINE_LOOK_EVERY_S)
         while data := self._line.receive(time.monotonic() + self._silence_s):
             frame = (frame + data)[: LARGEST_FRAME + 1]  # longer is none
         return frame

@@ -4,7 +4,7 @@ import pytest
 from pymodbus.constants import ExcCodes
 
 from config.codes import ExperimentState
-from config.registers import BY_NAME, MOST_POINTS
+from config.registers import BY_NAME, MOST_EXPERIMENT_POINTS
 from fieldbus.modbus.register_answers import RegisterError
 from tests.daemon.test_supervisory_registers import Panel, refused
 
@@ -61,7 +61,7 @@ def test_a_start_that_miscounts_and_a_point_out_of_turn_are_refused() -> None:
     panel = loaded()
     assert refused(panel, "experiment_start", len(POINTS) - 1) is ExcCodes.ILLEGAL_VALUE
     assert refused(panel, "experiment_time", 1.0) is ExcCodes.ILLEGAL_VALUE
-    assert refused(panel, "experiment_start", MOST_POINTS + 1) is ExcCodes.ILLEGAL_VALUE
+    assert refused(panel, "experiment_start", MOST_EXPERIMENT_POINTS + 1) is ExcCodes.ILLEGAL_VALUE
     before = panel.cycle.requests
     with pytest.raises(RegisterError):
         write_point(panel, len(POINTS) + 1, 1.0, 1.0)

@@ -1,4 +1,4 @@
-"""The units for systemd: right by its own checks, as hard as docs/interfaces.md says, and what they rest on is true."""
+"""The units for systemd: right by its own checks, as hard as docs/gateway.md says, and what they rest on is true."""
 
 import re
 import shutil
@@ -13,7 +13,7 @@ from positioner.daemon.pacing import FIFO_PRIORITY
 
 DEPLOY = Path(__file__).parents[2] / "deploy"
 UNITS = sorted((DEPLOY / "systemd").glob("*.service"))
-TOLD = (DEPLOY.parent / "docs" / "interfaces.md").read_text()
+TOLD = (DEPLOY.parent / "docs" / "gateway.md").read_text()
 DAEMON = (DEPLOY / "systemd" / "positioner@.service").read_text()
 ANALYZE = shutil.which("systemd-analyze")
 

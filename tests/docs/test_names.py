@@ -7,6 +7,7 @@ import shlex
 from collections.abc import Callable, Iterator
 from functools import cache
 from importlib.util import find_spec
+from itertools import takewhile
 from pathlib import Path
 from typing import NamedTuple, get_args
 
@@ -154,7 +155,7 @@ def wrong_table(table: str, key: str | None) -> str | None:
     """Say what is wrong with `[table] key` of the daemon's or the slave's file."""
     fields = [schema.model_fields[table] for schema in (DaemonFile, SlaveFile) if table in schema.model_fields]
     if not fields:
-        return None if table in {"valve", "drive", "effect"} else "no such table"
+        return None if table in {"valve", "drive", "effect", "export"} else "no such table"
     return None if key is None or any(key in keys(field.annotation) for field in fields) else "no such key"
 
 
@@ -192,7 +193,7 @@ def test_every_command_line_can_be_parsed(document: Path) -> None:
     for line in lines(document.read_text(encoding="utf-8")):
         words = shlex.split(line, comments=True) if re.match(r"(positioner|make|python) ", line) else []
         if words[:1] == ["positioner"]:
-            parser().parse_args([word for word in words[1:] if word not in {"&", "|"}])
+            parser().parse_args([word for word in takewhile(lambda word: word != "|", words[1:]) if word != "&"])
         elif words:
             assert missing(" ".join(words[:3] if words[0] == "python" else words[:2])) is None, line
 

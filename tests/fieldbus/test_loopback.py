@@ -12,7 +12,7 @@ import can
 import pytest
 
 from fieldbus.canopen import loopback as can_bus
-from fieldbus.canopen.loopback import ENDS, HOST, MAGIC, WINDOW, LoopbackBus, free_channel
+from fieldbus.canopen.loopback import CHANNEL_ENDS, HOST, MAGIC, WINDOW, LoopbackBus, free_channel
 
 pytestmark = pytest.mark.real_time
 
@@ -134,7 +134,7 @@ def test_nothing_is_lost_in_a_burst_of_all_to_all(join: Join, monkeypatch: pytes
 
 
 def test_as_many_frames_as_all_others_may_send_unread_fit_into_the_receive_buffer(join: Join) -> None:
-    reader, senders = join(), [join() for _ in range(ENDS - 1)]
+    reader, senders = join(), [join() for _ in range(CHANNEL_ENDS - 1)]
     for end in senders:
         for n in range(WINDOW):
             end.send(frame(n, bytes(8)))
@@ -299,7 +299,7 @@ def test_a_change_of_filters_loses_nothing_and_holds_up_nobody(join: Join, monke
 
 
 def test_a_full_bus_and_a_bad_channel_are_refused(join: Join) -> None:
-    for _ in range(ENDS):
+    for _ in range(CHANNEL_ENDS):
         join()
     with pytest.raises(can.CanInitializationError, match="all of its 16 ends are taken"):
         join()

@@ -20,7 +20,7 @@ SITE = DaemonFile.model_validate({"valve": {"name": "FV-1", "stroke_m": 0.04}, "
 PASSES = "print('1 of 1: partial stroke, 3 s'); print('partial stroke test of FV-1: passed'); print('kept')"
 WAITS = """
 import signal, sys, time
-signal.signal(signal.SIGTERM, lambda *_: sys.exit('broken off; the law has the valve again'))
+signal.signal(signal.SIGTERM, lambda *_: sys.exit('broken off; the law commands the valve again'))
 print('under way', flush=True)
 time.sleep(60.0)
 """
@@ -80,7 +80,7 @@ def test_one_at_a_time_and_broken_off_by_whoever_began_it(monkeypatch: pytest.Mo
     assert begun(tests) == Confirmation(False, "a test is under way already")
     tests.end()
     under_way.join(60.0)
-    assert found == [Confirmation(False, "broken off; the law has the valve again")]
+    assert found == [Confirmation(False, "broken off; the law commands the valve again")]
     assert registers.values["experiment_consent"] == 0.0
 
 

@@ -71,7 +71,7 @@ def test_a_daemon_started_anew_is_an_event() -> None:
     polled.view.lose(1.1, "away")
     polled.time_s = 2.0
     polled.poll(0.1, cycles=0.0)
-    assert polled.events[0] == "the daemon was started anew"
+    assert polled.events[0] == "the daemon has restarted"
     assert polled.view.at(polled.time_s).restarts == 1
 
 

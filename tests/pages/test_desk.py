@@ -200,7 +200,7 @@ def test_the_race_and_the_errors_are_in_the_unit_that_was_chosen(desk: Desk) -> 
     panel = cast(SearchPanel, SimpleNamespace(_desk=desk))
     for unit, error in {"mm": 2.54, "in": 0.1}.items():
         desk.units.position = unit
-        drawn = SearchPanel._drawn(panel)
+        drawn = SearchPanel._draw(panel)
         assert drawn["data"][0]["x"] == pytest.approx([error])
         assert f"fitted error, {unit} rms" in str(drawn["layout"]["xaxis"])
         assert (desk.errors.shown(2.54e-3).text, desk.errors.unit) == (f"{error:g}", unit)

@@ -69,8 +69,8 @@ def select_forces(page: Page) -> None:
 
 def goes_to_where_it_fails_and_in_other_units(page: Page, given_mm: float) -> None:
     # A sentence goes to where it shows; in other units everything is said anew.
-    page.get_by_test_id("sentences").get_by_role("button", name="after every reversal").click()
-    expect(page.get_by_test_id("where")).to_have_text(re.compile(r"^1 of \d+: after every reversal"))
+    page.get_by_test_id("sentences").get_by_role("button", name="after a reversal").click()
+    expect(page.get_by_test_id("where")).to_have_text(re.compile(r"^1 of \d+: after a reversal"))
     expect(page.locator(".shapelayer path").first).to_be_attached()
     # What is selected in a plot of forces is marked over time.
     select_forces(page)

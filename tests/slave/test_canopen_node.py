@@ -10,7 +10,7 @@ from config.canopen_device import SHIPPED_EDS
 from config.quantities import QUANTITIES, CommunicationAction
 from config.slave_file import SlaveFile
 from config.valve_file import shipped_valve
-from fieldbus.canopen.eds import PRODUCT, VENDOR, read_eds
+from fieldbus.canopen.eds import PRODUCT_NUMBER, VENDOR_NUMBER, read_eds
 from fieldbus.canopen.objects import ACTIVATE, Control, NodeState
 from sim.slave.canopen_node import NO_TRANSFER, CanopenNode, DeviceStateMachine, Nmt
 from sim.slave.clocks import Clock, Lockstep, RealTime
@@ -113,8 +113,8 @@ def test_it_boots_into_pre_operational_where_there_is_sdo_but_no_pdo(bench: Benc
     assert bench.node.state is Nmt.PRE_OPERATIONAL
     assert bench.takes(command(PUSH_PA), (SYNC, b"")) == []
     assert bench.device.samples == 0
-    assert struct.unpack("<I", bench.uploaded(0x1018, 2)) == (PRODUCT,)
-    assert struct.unpack("<I", bench.uploaded(0x1018, 1)) == (VENDOR,)
+    assert struct.unpack("<I", bench.uploaded(0x1018, 2)) == (PRODUCT_NUMBER,)
+    assert struct.unpack("<I", bench.uploaded(0x1018, 1)) == (VENDOR_NUMBER,)
 
 
 def test_operational_one_sync_gives_the_tpdos_of_one_sample(bench: Bench) -> None:
@@ -332,4 +332,4 @@ def test_torn_or_wild_sdo_requests_move_nothing(bench: Bench, data: bytes) -> No
     bench.activate()
     bench.takes((0x600 + NODE, data))
     assert (bench.device.samples, bench.node.state) == (0, Nmt.OPERATIONAL)
-    assert struct.unpack("<I", bench.uploaded(0x1018, 2)) == (PRODUCT,)
+    assert struct.unpack("<I", bench.uploaded(0x1018, 2)) == (PRODUCT_NUMBER,)

@@ -145,7 +145,7 @@ def test_what_is_wrong_ends_it_in_a_code_and_proposes_nothing(bad: object, verdi
 def test_a_fault_on_the_way_ends_it_under_the_command_in_force_never_vented() -> None:
     found, valve = commissioned(faults=(DeviceFault(kind="nan", at_s=40.0, over_s=5.0),))
     assert found.outcome.verdicts == (ValveTestVerdict.BROKEN_OFF,)
-    assert "fault: a measurement that cannot be" in found.outcome.notes[0]
+    assert "fault: the measurement is impossible" in found.outcome.notes[0]
     assert valve.cycle.snapshot.decision.fault is Fault.IMPLAUSIBLE
     held_pa = valve.command_pa()
     valve.watch(5.0)

@@ -34,9 +34,9 @@ def test_backlash_is_said_to_go_too_far_after_every_reversal() -> None:
     valve = drawn_valve(np.random.default_rng(2))
     compared = compare(record_of(with_effect(valve, "backlash", width_m=1.2e-3), 2), valve)
     assert not compared.adequate
-    said = next(each for each in compared.sentences if each.startswith("after every reversal"))
+    said = next(each for each in compared.sentences if each.startswith("after a reversal"))
     assert said.endswith("mm too far, both directions")
-    assert float(said.split()[3]) == pytest.approx(0.6, abs=0.07)
+    assert float(said.split()[6]) == pytest.approx(0.6, abs=0.07)
 
 
 def test_asymmetric_friction_stands_too_high_throughout() -> None:

@@ -19,7 +19,7 @@ from workbench.fleet.examination import Change, Examination
 from workbench.fleet.fleet import fleet
 from workbench.fleet.manifest import Entry, read_manifest
 from workbench.fleet.model_changes import changed_since
-from workbench.fleet.tables import columns_told, write_tables
+from workbench.fleet.tables import write_tables
 from workbench.fleet.valve_course import ValveCourse
 
 PLACES = {"valve": "V", "file": "V.toml", "recording": "r.csv"}
@@ -135,10 +135,6 @@ def test_the_columns_are_of_the_same_types_whatever_was_found(tmp_path: Path, ra
     assert (row["kind"], row["outcome"], row["cost_share"]) == ("nothing known", "unreadable", None)
     (row,) = parquet.read_table(tmp_path / "out" / "recordings.parquet").to_pylist()
     assert row["when"] == datetime(2025, 12, 31, 23, tzinfo=UTC)
-
-
-def test_the_document_has_the_columns_of_the_tables() -> None:
-    assert columns_told() in (ROOT / "docs" / "fleet.md").read_text()
 
 
 def test_what_changed_is_drawn_and_a_date_that_cannot_be_compared_refused(

@@ -119,4 +119,6 @@ def test_a_person_meets_it_as_diagnose(capsys: pytest.CaptureFixture[str]) -> No
     path = str(DATA / "diaphragm_bench" / "static_curve.csv")
     assert main(["diagnose", path, "--valve", "seed"]) == 1
     out = capsys.readouterr().out
-    assert out.startswith("no command in it: a balance of forces, not a simulation\none_of: Missing: position_friction")
+    assert out.startswith(
+        "the recording has no command: forces are balanced, nothing is simulated\none_of: Missing: position_friction"
+    )

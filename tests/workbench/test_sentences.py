@@ -31,10 +31,10 @@ FOUND = Findings(
 @pytest.mark.parametrize(
     ("missed", "spurious", "said"),
     [
-        (0, 3, "it makes 3 spurious slips"),
-        (0, 1, "it makes 1 spurious slip"),
-        (2, 0, "it misses 2 of 22 slips"),
-        (2, 1, "it misses 2 of 22 slips and makes 1 spurious slip"),
+        (0, 3, "the model makes 3 spurious slips"),
+        (0, 1, "the model makes 1 spurious slip"),
+        (2, 0, "the model misses 2 of 22 slips"),
+        (2, 1, "the model misses 2 of 22 slips and makes 1 spurious slip"),
     ],
 )
 def test_slips_missed_and_spurious_are_counted_and_none_is_not_said(missed: int, spurious: int, said: str) -> None:
@@ -61,7 +61,7 @@ def test_a_sentence_of_slips_points_to_them_the_gravest_first_and_to_no_others()
     slips = [MatchedSlip(10.0 * i, (-1) ** i, i % 4 < 2, 0.0, (1.0 + 0.01 * i) * 1e-3) for i in range(24)]
     slips += [MatchedSlip(300.0 + i, 1, False, 0.0, 1e-6 * i) for i in range(4)]
     told = judged(replace(FOUND, events=SlipEvents(tuple(slips), (), ())))
-    said = next(each for each in told if each.text.startswith("after every reversal"))
+    said = next(each for each in told if each.text.startswith("after a reversal"))
     assert [each.begin_s for each in said.stretches] == [10.0 * i for i in range(23, -1, -1) if i % 4 < 2]
 
 

@@ -29,7 +29,7 @@ from sim.effect import Effect, find_effects, first_effects, shipped_effect
 from workbench.blind.input_signal import excitation
 from workbench.blind.trial import LEVELS, NOISE_M, Answer, Trial, refitted_rmse_m
 
-VISIBLE = 0.5
+VISIBLE_FLOORS = 0.5
 LEAST_TRAVEL = 0.1
 """Of the stroke, in either record."""
 
@@ -128,7 +128,7 @@ def _visible(
     others = tuple(each for each in truth.effect if each is not effect)
     clean_m = [each.indicated_m for each in answers]
     fit_m, test_m = refitted_rmse_m(trials, clean_m, ValveFile(valve=truth.valve, effect=others))
-    return {"fit_m": fit_m, "test_m": test_m, "is_visible": fit_m > VISIBLE * floor_m}
+    return {"fit_m": fit_m, "test_m": test_m, "is_visible": fit_m > VISIBLE_FLOORS * floor_m}
 
 
 def drawn_valve(generator: Draw) -> ValveParameters:

@@ -27,7 +27,7 @@ from config.valve_file import ValveParameters
 FIRST_PASSAGE_SHARE = 0.26
 """Part of the record that is the first passage, and again the last."""
 MOVES_OF_FIRST = 4
-AT_REST = 0.04
+FIRST_REST_SHARE = 0.04
 """Part of the first passage before its first move."""
 CLOSED, OPEN = (0.05, 0.3), (0.65, 0.97)
 """Parts of the stroke between which the moves go."""
@@ -68,7 +68,7 @@ def excitation(valve: ValveParameters, generator: np.random.Generator, count: in
     home_pa = closing_pa(valve, CLOSED[0] * valve.stroke_m)
     levels = [home_pa, *(_level_pa(valve, generator, opens=i % 2 == 0) for i in range(len(moves) - 1)), home_pa]
     early = round(FIRST_PASSAGE_SHARE * count)
-    rest = round(AT_REST * early)
+    rest = round(FIRST_REST_SHARE * early)
     counts = [
         *_shared(generator, early - rest, MOVES_OF_FIRST),
         *_shared(generator, count - 2 * early, len(moves) - MOVES_OF_FIRST),

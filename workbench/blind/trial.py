@@ -37,7 +37,7 @@ COARSE_S = 1e-3
 """Step of the refit."""
 SCALES = ((100.0, 1e-3), (30.0, 3e-4), (5.0, 1e-4))
 """Of the soft-L1 loss, in standard deviations of the noise, and of the differences, as the cost is a staircase."""
-MOST_STATIC = 1.6
+MOST_LOG_STATIC = 1.6
 """log(F_s / F_c) at most."""
 
 
@@ -136,7 +136,7 @@ def refitted_rmse_m(trials: Sequence[Trial], answers: Sequence[Column], without:
     start = known.theta
     z = np.log([start[SPRING], start[VISCOUS], start[COULOMB], start[STATIC] / start[COULOMB]])
     lower, upper = z - 1.0, z + 1.0
-    lower[-1], upper[-1] = 0.0, MOST_STATIC
+    lower[-1], upper[-1] = 0.0, MOST_LOG_STATIC
     z = np.clip(z, lower + 1e-6, upper - 1e-6)
     for scale, difference in SCALES:
         found = least_squares(

@@ -27,7 +27,7 @@ MOST_LISTED = 8
 """Notes listed one by one."""
 NAMED_PHASE_SHARE = 0.5
 """Part of the squared error from which a phase is named."""
-MOST_STRETCHES = 20
+MOST_TOLD_STRETCHES = 20
 """Of a sentence, the gravest."""
 
 
@@ -153,7 +153,7 @@ def shortened(notes: Sequence[str]) -> tuple[str, ...]:
 
 def _along_motion(found: Findings) -> Iterator[Graded]:
     """Too far or too short at the end of slips, after reversals and otherwise."""
-    for when, reversal in (("after every reversal", True), ("where it goes on in one direction", False)):
+    for when, reversal in (("after a reversal, the model slips", True), ("without a reversal, the model slips", False)):
         pairs = [each for each in found.events.matched if each.reversal == reversal]
         yield from _by_direction(
             pairs, [each.farther_m for each in pairs], found.matters_m, when, ("too far", "too short"), found.mm
@@ -165,7 +165,7 @@ def _late(found: Findings) -> Iterator[Graded]:
     pairs = found.events.matched
     period_s = float(np.median(np.diff(found.time_s))) if found.time_s.size > 1 else 0.0
     graded = _by_direction(
-        pairs, [each.late_s for each in pairs], 2.0 * period_s, "its slips come", ("too late", "too early"), _seconds
+        pairs, [each.late_s for each in pairs], 2.0 * period_s, "the model slips", ("too late", "too early"), _seconds
     )
     for _, sentence in graded:
         yield 0.5 * found.rms_m, sentence
@@ -192,26 +192,26 @@ def _by_direction(
         if pooled.size >= FEWEST_SLIPS and len({each.direction for each in pairs}) == 2:
             mean, error = float(np.median(pooled)), float(np.std(pooled, ddof=1)) / pooled.size**0.5
             if _certain(mean, error, matters):
-                text = f"{when}, {unit(abs(mean))} {words[0] if mean > 0 else words[1]}, both directions"
+                text = f"{when} {unit(abs(mean))} {words[0] if mean > 0 else words[1]}, both directions"
                 yield abs(mean), Sentence(text, _of_slips(pairs, values, (1, -1)))
         return
     told = {way: f"{unit(abs(mean))} {words[0] if mean > 0 else words[1]}" for way, mean in means.items()}
     grade = max(abs(mean) for mean in means.values())
     if len(means) == 1:
         ((way, amount),) = told.items()
-        text = f"{when}, {amount}, only when {'opening' if way > 0 else 'closing'}"
+        text = f"{when} {amount}, only when {'opening' if way > 0 else 'closing'}"
     elif means[1] * means[-1] > 0.0 and 0.5 < means[1] / means[-1] < 2.0:
         both = 0.5 * (means[1] + means[-1])
-        text = f"{when}, {unit(abs(both))} {words[0] if both > 0 else words[1]}, both directions"
+        text = f"{when} {unit(abs(both))} {words[0] if both > 0 else words[1]}, both directions"
     else:
-        text = f"{when}, {told[1]} when opening and {told[-1]} when closing"
+        text = f"{when} {told[1]} when opening and {told[-1]} when closing"
     yield grade, Sentence(text, _of_slips(pairs, values, tuple(means)))
 
 
 def _offset(found: Findings) -> Iterator[Graded]:
     mean, error = _block_mean(found, np.ones(found.time_s.size, np.bool_))
     if _certain(mean, error, found.matters_m) and abs(mean) > 0.5 * found.rms_m:
-        text = f"it stands {found.mm(abs(mean))} too {'high' if mean > 0 else 'low'} throughout"
+        text = f"the model stands {found.mm(abs(mean))} too {'high' if mean > 0 else 'low'} throughout"
         yield abs(mean), Sentence(text)
 
 
@@ -236,7 +236,7 @@ def _trends(found: Findings) -> Iterator[Graded]:
         if _certain(float(slope), spread, 0.0) and abs(change) > max(2.0 * found.matters_m, found.rms_m):
             at_low, at_high = slope * low + intercept, slope * high + intercept
             first, last = (found.length.said(each, "+.2g") for each in (at_low, at_high))
-            text = f"its error changes {what}: {first} at {unit(low)}, {last} at {unit(high)}"
+            text = f"the error changes {what}: {first} at {unit(low)}, {last} at {unit(high)}"
             yield 0.5 * abs(change), Sentence(text, _runs(found, blocks, np.abs(y)))
 
 
@@ -247,7 +247,7 @@ def _slips(found: Findings) -> Iterator[Sentence]:
     if spurious:
         said.append(f"makes {_count(spurious, 'spurious ')}")
     if said:
-        yield Sentence(f"it {' and '.join(said)}", _at((*found.events.missed_s, *found.events.spurious_s)))
+        yield Sentence(f"the model {' and '.join(said)}", _at((*found.events.missed_s, *found.events.spurious_s)))
 
 
 def _share(found: Findings) -> Iterator[Sentence]:
@@ -277,13 +277,13 @@ def _rest(found: Findings, named: bool) -> Iterator[Sentence]:
 
 
 def _at(times_s: Sequence[float]) -> tuple[Stretch, ...]:
-    return tuple(Stretch(each, each) for each in times_s[:MOST_STRETCHES])
+    return tuple(Stretch(each, each) for each in times_s[:MOST_TOLD_STRETCHES])
 
 
 def _of_slips(pairs: Sequence[MatchedSlip], values: Sequence[float], ways: Sequence[int]) -> tuple[Stretch, ...]:
     """Return where the slips of these directions are, those with the largest values first."""
     both = sorted(zip(values, pairs, strict=True), key=lambda each: -abs(each[0]))
-    slips = [pair for _, pair in both if pair.direction in ways][:MOST_STRETCHES]
+    slips = [pair for _, pair in both if pair.direction in ways][:MOST_TOLD_STRETCHES]
     return tuple(Stretch(*sorted((each.time_s, each.time_s + each.late_s))) for each in slips)
 
 
@@ -298,7 +298,7 @@ def _runs(found: Findings, run: NDArray[np.int64], grade: Column) -> tuple[Stret
     order = np.argsort(run, kind="stable")  # a clock that is set back leaves them out of order
     first = order[np.searchsorted(run[order], np.arange(grade.size))]
     last = order[np.searchsorted(run[order], np.arange(grade.size), side="right") - 1]
-    gravest = [each for each in np.argsort(-grade, kind="stable")[:MOST_STRETCHES] if grade[each] > 0.0]
+    gravest = [each for each in np.argsort(-grade, kind="stable")[:MOST_TOLD_STRETCHES] if grade[each] > 0.0]
     return tuple(Stretch(float(found.time_s[first[each]]), float(found.time_s[last[each]])) for each in gravest)
 
 

@@ -16,7 +16,7 @@ from numpy.typing import NDArray
 from config.recording import Column
 from config.results.result import Brief
 
-LAGS = 25
+RESIDUAL_LAGS = 25
 NEXT = 5
 """Samples over which what is no noise goes on."""
 BAND_99 = 2.576
@@ -88,7 +88,7 @@ def profile(over: Column, values: Column, bins: int = BINS) -> Profile:
 def autocorrelation(residual_m: Column, period_s: float) -> Correlation:
     """Return rho at lags 0 to 25, (26,), of an evenly sampled residual, m, (n,), with the 99 % band (Ljung, 16.6)."""
     rho = _correlated(residual_m, residual_m)
-    lag = np.arange(min(LAGS + 1, residual_m.size))
+    lag = np.arange(min(RESIDUAL_LAGS + 1, residual_m.size))
     return Correlation(lag, np.asarray(lag * period_s, np.float64), rho[lag], BAND_99 / residual_m.size**0.5)
 
 
@@ -98,7 +98,7 @@ def cross_correlation(command_pa: Column, residual_m: Column, period_s: float) -
     The band, 99 %, is that of Ljung, System Identification, 16.6.
     """
     n = residual_m.size
-    reach = min(LAGS, n - 1)
+    reach = min(RESIDUAL_LAGS, n - 1)
     lag = np.arange(-reach, reach + 1)
     memory = np.arange(1, max(2, int(MEMORY * n)))
     taper = 1.0 - memory / memory.size

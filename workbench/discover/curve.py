@@ -26,7 +26,7 @@ CURVED = frozenset({"position", "position_and_pressure", "pressure", "speed"})
 """Variables over which a curve may go."""
 LOCAL = frozenset({"bump", "step"})
 """Shapes that change at one place only."""
-ABOUT = (-2.5, -1.9, -1.55, -1.3, -1.05, -0.8, -0.45, 0.0, 0.45, 0.8, 1.05, 1.3, 1.55, 1.9, 2.5)
+KNOT_WIDTHS = (-2.5, -1.9, -1.55, -1.3, -1.05, -0.8, -0.45, 0.0, 0.45, 0.8, 1.05, 1.3, 1.55, 1.9, 2.5)
 """Knots about such a place, in widths."""
 EVENLY = 9
 NEARER = 0.02
@@ -79,7 +79,7 @@ def _knots(form: Form, values: Mapping[str, float], span: tuple[float, float]) -
     low, high = span
     evenly = np.linspace(low, high, EVENLY).tolist()
     if form.shape.name in LOCAL:
-        about = [values["place"] + values["width"] * each for each in ABOUT]
+        about = [values["place"] + values["width"] * each for each in KNOT_WIDTHS]
         knots = [low, *(each for each in about if low < each < high), high]
     else:
         knots = sorted([*evenly, *([values["place"]] if low < values.get("place", low) < high else [])])

@@ -11,7 +11,7 @@ from textwrap import fill, indent
 from workbench.discover.curve import FLAT, HEIGHT
 from workbench.discover.grammar import Form, Quantity
 
-WIDTH = 116
+LINE_CHARACTERS = 116
 
 
 def write_forms(forms: Sequence[Form], folder: Path) -> dict[str, Form]:
@@ -37,8 +37,8 @@ def form_text(form: Form, found: Mapping[str, float] | None = None, remarks: Seq
         "",
         *(f"    {each}" for each in form.equations),
         "",
-        fill(_symbols(form), WIDTH),
-        *(fill(each, WIDTH) for each in remarks),
+        fill(_symbols(form), LINE_CHARACTERS),
+        *(fill(each, LINE_CHARACTERS) for each in remarks),
         '"""',
     ]
     parameters = "\n".join(_declared(each, _begin(each, found)) for each in form.quantities)

@@ -12,7 +12,7 @@ from workbench.discover.form_file import form_text
 from workbench.discover.grammar import Form
 from workbench.select.effect_candidates import EvaluatedModel
 
-LAGS = 5.0
+SHOWN_TIME_CONSTANTS = 5.0
 """Time constants over which a picture shows what fades."""
 
 
@@ -34,7 +34,7 @@ class FoundForm(Brief):
         values = {key: float(table.parameters[key]) for key in effect.parameters}
         span = variable_range(form, fit, split)
         if form.variable.name == "past":
-            span = (0.0, LAGS * values["time_constant_s"])
+            span = (0.0, SHOWN_TIME_CONSTANTS * values["time_constant_s"])
         return cls(form, model, values, span, added_force(form, effect, values, span, fit))
 
     def text(self, source: str) -> str:

@@ -56,7 +56,7 @@ SEARCHED, CHECKED = (1, 2), (3, 4, 5)
 IMITATED = 1.001
 """A separation below it is none."""
 CORRELATION_S = 0.2
-SHORTEST_S = 0.05
+SHORTEST_LEG_S = 0.05
 """Of a leg."""
 
 
@@ -251,11 +251,11 @@ def _changed(course: Course, span_pa: float, generator: np.random.Generator) -> 
         legs = [replace(each, ramp_s=stretch * each.ramp_s, hold_s=stretch * each.hold_s) for each in legs]
     elif what == 2:
         legs[i] = replace(
-            leg, ramp_s=max(SHORTEST_S, leg.ramp_s) * float(np.exp(3.0 * size * generator.standard_normal()))
+            leg, ramp_s=max(SHORTEST_LEG_S, leg.ramp_s) * float(np.exp(3.0 * size * generator.standard_normal()))
         )
     elif what == 3:
         legs[i] = replace(
-            leg, hold_s=max(SHORTEST_S, leg.hold_s) * float(np.exp(3.0 * size * generator.standard_normal()))
+            leg, hold_s=max(SHORTEST_LEG_S, leg.hold_s) * float(np.exp(3.0 * size * generator.standard_normal()))
         )
     else:
         legs[i] = replace(leg, level_pa=leg.level_pa + size * span_pa * float(generator.standard_normal()))

@@ -34,7 +34,7 @@ from workbench.select.effect_acceptance import evidence_for
 
 ODDS = 100.0
 """Of the best against all others, that name it."""
-EXPLAINED = (0.5, 0.75)
+ERROR_QUANTILES = (0.5, 0.75)
 """Quantiles of the errors of events."""
 ASKED = 3
 """Rivals that an experiment is designed for, the likeliest: to choose one costs by the square of their number."""
@@ -141,9 +141,9 @@ class RivalRace:
 
         In half of the events, and in three quarters.
         """
-        earlier_m = np.quantile(self._begun.errors_m(self.best), EXPLAINED)
+        earlier_m = np.quantile(self._begun.errors_m(self.best), ERROR_QUANTILES)
         played_from = sum(map(len, self._begun._recordings))
-        now_m = np.quantile(self.errors_m(self.best, played_from), EXPLAINED)
+        now_m = np.quantile(self.errors_m(self.best, played_from), ERROR_QUANTILES)
         allowed = np.array([AT_FLOOR, RARELY_OFF]) * np.maximum(self.record.floor_or_scale_m, earlier_m)
         return bool(np.all(now_m <= allowed))
 

@@ -82,10 +82,10 @@ class ModelChanges(Result):
 
     def plot(self) -> "Figure":
         """Draw by how much each parameter changed, valve by valve; an effect that is new reaches the edge."""
-        from config.results.drawing import BETTER, MODEL, ROW, panels
+        from config.results.drawing import BETTER, MODEL, ROW_INCHES, panels
 
         drawn = self.changes[:MOST_DRAWN]
-        figure, (axes,) = panels((1.2 + ROW * max(len(drawn), 1),))
+        figure, (axes,) = panels((1.2 + ROW_INCHES * max(len(drawn), 1),))
         for row, each in enumerate(reversed(drawn)):
             new = each.percent is None
             percent = LONGEST_PERCENT if each.percent is None else each.percent

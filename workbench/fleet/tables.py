@@ -5,7 +5,7 @@ the examinations alone and hold no time of their making: the same inputs, the sa
 
     python -m workbench.fleet.tables
 
-prints the columns as docs/fleet.md has them.
+prints the columns.
 """
 
 import json

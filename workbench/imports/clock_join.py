@@ -32,7 +32,7 @@ RATIOS = tuple(each for unit in UNITS["_s"].values() if unit != 1.0 for each in 
 """Of two clocks that count in different units."""
 ZONE_S = 900.0
 """Zones of time lie apart by quarters of an hour."""
-SELDOM = 0.5
+CHANGES_PER_SAMPLE = 0.5
 """Changes of a command a sample of the stem, up to which each keeps its instant."""
 SAME = 1e-3
 """Of a clock's step: times that are closer are one, for two programs round them differently."""
@@ -143,7 +143,7 @@ def _with_changes(
             following = np.minimum(np.searchsorted(base_s, at_s), base_s.size - 1)
             apart = np.minimum(np.abs(base_s[following] - at_s), np.abs(base_s[np.maximum(following - 1, 0)] - at_s))
             between = at_s[(apart > near_s) & (at_s > base_s[0]) & (at_s < base_s[-1])]
-            added += [between] if between.size <= SELDOM * base_s.size else []
+            added += [between] if between.size <= CHANGES_PER_SAMPLE * base_s.size else []
     instants = np.unique(np.concatenate(added)) if added else np.empty(0)
     time_s = np.concatenate([base_s, instants])
     order = np.argsort(time_s, kind="stable")

@@ -130,13 +130,13 @@ def columns_of_all(tables: Sequence[RawTable], first: Header) -> list[ColumnPrev
         values = signal_places(header)
         if table.sheet and len(values) == 1 and len(tables) > 1:
             signal = header.names[values[0]]
-            columns = [_renamed(each, table.sheet) if each.name == signal else each for each in columns]
+            columns = [_rename(each, table.sheet) if each.name == signal else each for each in columns]
         taken = {each.name for each in found}
         found += [each for each in columns if each.name not in taken]
     return found
 
 
-def _renamed(column: ColumnPreview, name: str) -> ColumnPreview:
+def _rename(column: ColumnPreview, name: str) -> ColumnPreview:
     return ColumnPreview(name, column.unit, column.cells, column.unknown, column.clock)
 
 

@@ -76,13 +76,13 @@ def read_export(
         units |= {each.name: unit_of(path, each, part) for each in of_it}
         groups.append(_group(path, part, of_it, units, decimal, scale, options, tell, metadata))
     said = ", ".join(f"{each.name} from {each.theirs} in {units.get(each.name, 's')}" for each in sources)
-    metadata = {"imported": said} | _assumed(units, range_pa) | metadata
+    metadata = {"imported": said} | _list_assumptions(units, range_pa) | metadata
     (time_s, columns, notes) = (groups[0].time_s, groups[0].columns, {}) if len(groups) == 1 else joined(path, groups)
     named = {"time_s": time_s} | columns
     return Recording.of({name: named[name] for name in sorted(named, key=_contract_order)}, metadata | notes)
 
 
-def _assumed(units: dict[str, str], range_pa: tuple[float, float] | None) -> dict[str, str]:
+def _list_assumptions(units: dict[str, str], range_pa: tuple[float, float] | None) -> dict[str, str]:
     """Return what had to be assumed of the pressures that shares are of, and how to say others."""
     shares = [
         f"{name} in {unit}"

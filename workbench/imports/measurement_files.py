@@ -68,7 +68,7 @@ def matlab(path: Path) -> list[RawTable]:
         InputError: it is damaged, or holds no vectors.
         ModuleNotFoundError: scipy is not installed; names the extra.
     """
-    return _required(path, _tables(matlab_columns(path), "vectors"))
+    return _require_tables(path, _tables(matlab_columns(path), "vectors"))
 
 
 def hdf5(path: Path) -> list[RawTable]:
@@ -86,7 +86,7 @@ def hdf5(path: Path) -> list[RawTable]:
         raise
     except Exception as error:  # a damaged file fails anywhere in the HDF5 library
         raise InputError(str(path), f"is a damaged HDF5 file: {first_line(error)}") from None
-    return _required(path, _tables(columns, "vectors"))
+    return _require_tables(path, _tables(columns, "vectors"))
 
 
 def _datasets(path: Path, h5py: Any, group: Any, prefix: str = "") -> Iterator[tuple[str, Any]]:
@@ -113,14 +113,14 @@ def _channels(name: str, dataset: Any) -> Iterator[tuple[str, Any]]:
         return
     if dataset.dtype.kind not in NUMBERS or (kind is not None and bytes(kind) in (b"char", b"cell")):
         return
-    values = _unpacked(dataset)
+    values = _unpack(dataset)
     unit = next((_text(dataset.attrs[key]) for key in ("units", "unit", "Units", "Unit") if key in dataset.attrs), "")
     yield from (
         (with_unit(each, unit), vector) for each, vector in vectors_of(name, values if kind is None else values.T)
     )
 
 
-def _unpacked(dataset: Any) -> Any:
+def _unpack(dataset: Any) -> Any:
     """Return what a dataset stands for: netCDF, which is HDF5, packs numbers and marks missing ones (CF 2.5, 8.1)."""
     kept = {key: np.ravel(dataset.attrs[key]) for key in PACKING if key in dataset.attrs}
     kept = {key: value for key, value in kept.items() if value.size == 1 and value.dtype.kind in NUMBERS}
@@ -155,7 +155,7 @@ def tdms(path: Path) -> list[RawTable]:
         raise InputError(str(path), f"is a damaged TDMS file: {first_line(error)}") from None
     notes = (("torn", told.first),) if told.first else ()
     tables = [replace(table, notes=notes) for name, columns in groups for table in _tables(columns, name, name)]
-    return _required(path, tables)
+    return _require_tables(path, tables)
 
 
 class _Told(logging.Handler):
@@ -204,7 +204,9 @@ def mdf4(path: Path) -> list[RawTable]:
         InputError: it is of another version, is damaged, or holds no channels of numbers.
         ModuleNotFoundError: asammdf is not installed; names the extra.
     """
-    return _required(path, [table for name, columns in mdf4_groups(path) for table in _tables(columns, name, name)])
+    return _require_tables(
+        path, [table for name, columns in mdf4_groups(path) for table in _tables(columns, name, name)]
+    )
 
 
 def _tables(columns: Columns, name: str, group: str = "") -> list[RawTable]:
@@ -216,7 +218,7 @@ def _tables(columns: Columns, name: str, group: str = "") -> list[RawTable]:
     ]
 
 
-def _required(path: Path, tables: list[RawTable]) -> list[RawTable]:
+def _require_tables(path: Path, tables: list[RawTable]) -> list[RawTable]:
     if not tables:
         raise no_vectors(path)
     return tables

@@ -33,7 +33,7 @@ _FORMS = {
 
 def is_numeral(text: str) -> bool:
     """Return whether a text is a number, with one decimal sign or the other."""
-    return any(form.fullmatch(_signed(text)) for form in _FORMS.values())
+    return any(form.fullmatch(_normalise_sign(text)) for form in _FORMS.values())
 
 
 def number(text: str, decimal: str) -> float | None:
@@ -44,7 +44,7 @@ def number(text: str, decimal: str) -> float | None:
     """
     if decimal == "." and _PLAIN.fullmatch(text):
         return float(text)
-    plain = _signed(text)
+    plain = _normalise_sign(text)
     if _FORMS[decimal].fullmatch(plain):
         for sign in GROUPING + (",." if decimal == "." else ".,")[0]:
             plain = plain.replace(sign, "")
@@ -52,7 +52,7 @@ def number(text: str, decimal: str) -> float | None:
     return None if _BODY.fullmatch(plain) else nan
 
 
-def _signed(text: str) -> str:
+def _normalise_sign(text: str) -> str:
     plain = text.replace("\u2212", "-") if "\u2212" in text else text
     return f"-{plain[:-1]}" if plain.endswith("-") and plain[:1].isdigit() else plain
 
@@ -68,10 +68,10 @@ def decimal_sign(source: str, texts: Iterable[str], separator: str) -> str:
     for text in texts:
         if "," not in text and "." not in text:
             continue
-        plain = _signed(text)
+        plain = _normalise_sign(text)
         if _AMBIGUOUS.fullmatch(plain):
             open_.setdefault("," if "," in plain else ".", text)
-        elif sign := _shown_by(plain):
+        elif sign := _decimal_sign_of(plain):
             shown.setdefault(sign, text)
     if len(shown) == 2:
         raise InputError(
@@ -92,7 +92,7 @@ def decimal_sign(source: str, texts: Iterable[str], separator: str) -> str:
     return "."
 
 
-def _shown_by(text: str) -> str | None:
+def _decimal_sign_of(text: str) -> str | None:
     """Return the decimal sign that a numeral shows; None if it is none."""
     if not _BODY.fullmatch(text):
         return None

@@ -52,7 +52,7 @@ def collected(path: Path, header: Header, clock: str | None, tell: Progress) -> 
         if len(row) <= max(max(places) for places in header.at.values()):
             short.append(line)
         for name, places in header.at.items():
-            cells[name].append(_joined(row, places))
+            cells[name].append(_join_cells(row, places))
         lines.append(line)
         if not len(lines) % TOLD_EVERY:
             _require_few(path, len(lines))
@@ -109,7 +109,7 @@ def _is_remark(row: Sequence[Cell], width: int) -> bool:
     return all(cell == "" for cell in row[1:]) or (str(row[0]).startswith("#") and len(row) < width)
 
 
-def _joined(row: Sequence[Cell], places: Sequence[int]) -> Cell:
+def _join_cells(row: Sequence[Cell], places: Sequence[int]) -> Cell:
     found = [row[place] if place < len(row) else "" for place in places]
     return found[0] if len(found) == 1 else " ".join(map(_midnight_cut, found)).strip()
 

@@ -20,7 +20,7 @@ from workbench.imports.raw_table import Cell, RawTable
 
 SEPARATORS = {"\t": "tab", ";": "semicolon", "|": "bar", ",": "comma"}
 SPACES = " "
-LOOKED_AT = 50
+HEADER_LINES = 50
 """Lines by which it is told whether spaces separate, and whether every line stands in quotation marks."""
 NO_TABLES = {
     r"\s*<(!doctype|html|table)\b": "is a web page: export the numbers as CSV",
@@ -56,14 +56,16 @@ def text_tables(path: Path) -> list[RawTable]:
     if is_labview(text):
         return [labview_table(text, ended=ended)]
     text = _without_annotations(text)
-    first = [line.strip() for line in islice(io.StringIO(text), 4 * LOOKED_AT) if line.strip()][:LOOKED_AT]
+    first = [line.strip() for line in islice(io.StringIO(text), 4 * HEADER_LINES) if line.strip()][:HEADER_LINES]
     _require_fields(path, first)
     notes = () if encoding.startswith("utf-8") else (("encoding", encoding),)
     length = text.count("\n") or text.count("\r")
     found = [each for each in SEPARATORS if each in text] or [","]
     if 2 * sum(_has_spaces_alone(line) for line in first) > len(first):
         return [
-            RawTable("fields separated by spaces", "line", partial(_spaced, text), SPACES, "", ended, notes, length)
+            RawTable(
+                "fields separated by spaces", "line", partial(_split_at_spaces, text), SPACES, "", ended, notes, length
+            )
         ]
     return [
         RawTable(
@@ -97,7 +99,7 @@ def _has_spaces_alone(line: str) -> bool:
     return bool(before) and not any(each in line for each in SEPARATORS) and last.lstrip("+-.")[:1].isdigit()
 
 
-def _spaced(text: str) -> Iterator[tuple[int, list[Cell]]]:
+def _split_at_spaces(text: str) -> Iterator[tuple[int, list[Cell]]]:
     for number, line in enumerate(io.StringIO(text), start=1):
         yield number, [cell.strip('"') for cell in line.split()]
 
@@ -163,7 +165,7 @@ def _rows(path: Path, text: str, separator: str) -> Iterator[tuple[int, list[Cel
         try:
             row = next(reader, None)
         except csv.Error as error:
-            raise InputError(str(path), f"line {begin}: {_said(error)}") from None
+            raise InputError(str(path), f"line {begin}: {_describe_error(error)}") from None
         if row is None:
             return
         if len(row) > MOST_COLUMNS:
@@ -171,7 +173,7 @@ def _rows(path: Path, text: str, separator: str) -> Iterator[tuple[int, list[Cel
         yield reader.line_num, [cell.strip() for cell in row]
 
 
-def _said(error: csv.Error) -> str:
+def _describe_error(error: csv.Error) -> str:
     if "field larger" in str(error):
         return f"a field of more than {csv.field_size_limit()} characters; is a quotation mark not closed?"
     if "unexpected end" in str(error):

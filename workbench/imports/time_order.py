@@ -67,7 +67,7 @@ def in_order(
     if dropped := int((~once).sum()):
         said["repeated rows"] = f"{dropped} left out"
         t, rows = t[once], rows[once]
-    t, rows = _sorted(t, rows, said)
+    t, rows = _sort_rows(t, rows, said)
     _require_a_clock(path, t, rows, lines)
     return t, rows, said
 
@@ -107,7 +107,7 @@ def _first_of_repeated(t: Array, values: Sequence[Array], rows: Rows) -> npt.NDA
     return once
 
 
-def _sorted(t: Array, rows: Rows, said: dict[str, str]) -> tuple[Array, Rows]:
+def _sort_rows(t: Array, rows: Rows, said: dict[str, str]) -> tuple[Array, Rows]:
     """Return the rows sorted by time, if they fall into place then; else as they are."""
     steps = np.diff(t)
     if not (steps < 0).any():

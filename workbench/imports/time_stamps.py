@@ -72,14 +72,18 @@ def seconds_of(
         naive = naive or stamp.tzinfo is None
         stamps[row] = (stamp if stamp.tzinfo else stamp.replace(tzinfo=UTC)).timestamp()
     steps_s = np.abs(np.diff(stamps, prepend=stamps[0]))
-    if time_format is not None and steps_s.max() >= DAY_S and _without_gaps(texts, other := _interchanged(time_format)):
+    if (
+        time_format is not None
+        and steps_s.max() >= DAY_S
+        and _without_gaps(texts, other := _swap_day_and_month(time_format))
+    ):
         row = int(steps_s.argmax())
         said = f"{texts[row]!r} is {steps_s[row] / DAY_S:.0f} days off the row before it by {time_format!r}"
         raise InputError(str(path), f'line {lines[row]}: {said}; it is not by --time-format "{other}"')
     return stamps - stamps[0], float(stamps[0]), naive
 
 
-def _interchanged(time_format: str) -> str:
+def _swap_day_and_month(time_format: str) -> str:
     """Return a format with day and month interchanged."""
     return re.sub("%[dm]", lambda each: "%m" if each[0] == "%d" else "%d", time_format)
 
@@ -138,5 +142,5 @@ def proposed_formats(texts: Sequence[str]) -> list[str]:
     for form in PROPOSED:
         if fractions == ("%f" in form) and texts and all(_by_format(text, form) is not None for text in texts):
             found.append(form)
-    going_on = [each for each in found if _interchanged(each) in found and _without_gaps(texts, each)]
-    return [each for each in found if each in going_on or _interchanged(each) not in going_on]
+    going_on = [each for each in found if _swap_day_and_month(each) in found and _without_gaps(texts, each)]
+    return [each for each in found if each in going_on or _swap_day_and_month(each) not in going_on]

@@ -48,7 +48,7 @@ def turned(table: RawTable) -> RawTable | None:
         table,
         what=f"{table.what}, a row a signal",
         place="value",
-        rows=partial(_numbered, columns),
+        rows=partial(_number_rows, columns),
         length=len(columns),
     )
 
@@ -59,7 +59,7 @@ def _is_signal(cells: Sequence[Cell]) -> bool:
     return name != "" and not begins_number(name) and 2 * sum(map(begins_number, numbers)) > len(numbers) > 0
 
 
-def _numbered(rows: Sequence[Sequence[Cell]]) -> Iterator[tuple[int, list[Cell]]]:
+def _number_rows(rows: Sequence[Sequence[Cell]]) -> Iterator[tuple[int, list[Cell]]]:
     yield from ((number, list(cells)) for number, cells in enumerate(rows, start=1))
 
 

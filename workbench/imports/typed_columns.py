@@ -103,7 +103,7 @@ def in_si(path: Path, samples: Samples, source: Source, unit: str, decimal: str,
     plain, turned = unit.removeprefix("-"), unit.startswith("-")
     own = Counter(each for each in units if each is not None)
     if len(own) < 2:
-        return _scaled(raw, source, plain, scale, turned=turned)
+        return _scale(raw, source, plain, scale, turned=turned)
     samples.notes[f"units of {source.theirs}, each cell by its own"] = ", ".join(
         f"{count} {name}" for name, count in own.most_common()
     )
@@ -117,7 +117,7 @@ def in_si(path: Path, samples: Samples, source: Source, unit: str, decimal: str,
     found = np.where(raw == 0.0, 0.0, np.nan)
     for each in own:
         rows = np.array([name == each for name in units])
-        found[rows] = _scaled(raw[rows], source, each, scale, turned=turned)
+        found[rows] = _scale(raw[rows], source, each, scale, turned=turned)
     return found
 
 
@@ -154,7 +154,7 @@ def _numbers(path: Path, samples: Samples, source: Source, decimal: str) -> tupl
     return found, units
 
 
-def _scaled(raw: Column, source: Source, unit: str, scale: Scale, *, turned: bool) -> Column:
+def _scale(raw: Column, source: Source, unit: str, scale: Scale, *, turned: bool) -> Column:
     """Return numbers of one unit in SI; see `export_units`."""
     ending, (stroke_m, range_pa) = ending_of(source.name), scale
     if ending == "_m" and (unit in SHARES or turned) and stroke_m is None:

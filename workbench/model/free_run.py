@@ -330,7 +330,7 @@ def _require_same_input(composition: Composition, record: Record) -> None:
         raise InputError(
             composition.source,
             "the recording has a set point, reference_m, and no command_pa: what obeys it must be in the valve file, "
-            '[[effect]] name = "positioner" (docs/recordings.md)',
+            '[[effect]] name = "positioner" (docs/recording-format.md)',
         )
     if composition.by_setpoint and not record.by_setpoint:
         raise InputError(

@@ -63,7 +63,7 @@ class ColumnsPanel:
                     each.props("dense").classes("w-full").on("blur", self._show)
             with ui.column().classes("wide"):
                 self._preview = ui.column().classes("w-full").props('data-testid="preview" aria-live="polite"')
-                self._confirm = ui.button("Read it so", on_click=self._taken).props('no-caps data-testid="confirm"')
+                self._confirm = ui.button("Read it", on_click=self._taken).props('no-caps data-testid="confirm"')
                 with ui.expansion("first values of every column", icon="table_rows").classes("w-full"):
                     self._table()
         ui.timer(0.0, self._show, once=True)
@@ -139,15 +139,15 @@ class ColumnsPanel:
         self._preview.clear()
         with self._preview:
             if read is None:
-                ui.label("It cannot be read so:").classes("text-weight-medium")
+                ui.label("This cannot be read:").classes("text-weight-medium")
             else:
                 ui.label(f"Read so: {read.recording.summary().splitlines()[0]}").classes("text-weight-medium")
                 FigureView(
-                    self._theme, lambda: self._drawn(read, stroke_m), PREVIEW_PX, "the recording as it would be read"
+                    self._theme, lambda: self._draw(read, stroke_m), PREVIEW_PX, "the recording as it would be read"
                 )
             sentences(said, "preview-said")
 
-    def _drawn(self, read: Opened, stroke_m: float | None) -> Figure:
+    def _draw(self, read: Opened, stroke_m: float | None) -> Figure:
         return export_figure(
             read.recording, math.nan if stroke_m is None else stroke_m, self._desk.units, self._theme.ink
         )

@@ -5,7 +5,7 @@ from pathlib import Path
 
 from webpage.listening_arguments import add_listening, listening
 
-HELP = "open the workbench in a browser: drop a recording, drag parameters, diagnose, add what is missing"
+HELP = "open the workbench in a browser: compare, diagnose, add what is missing"
 EXAMPLE = "positioner workbench rec.csv --valve seed"
 
 
@@ -18,9 +18,9 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
         "--password-file",
         type=Path,
         metavar="FILE",
-        help="the first line is the password of everybody; needed to listen beyond this machine",
+        help="its first line is the password for everybody; needed with --listen-host",
     )
-    parser.add_argument("--no-open", action="store_true", help="print the address, open no browser")
+    parser.add_argument("--no-open", action="store_true", help="print the address only; open no browser")
 
 
 def run(arguments: argparse.Namespace) -> int:

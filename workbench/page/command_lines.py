@@ -35,9 +35,9 @@ def command_lines(desk: Desk) -> tuple[str, ...]:
             lines.append(
                 ("discover", *_of(each.made.recording, each.made.held_out, each.made.before), "-o", each.made.form)
             )
-        lines += [words for words in (_made(each),) if words]
+        lines += [words for words in (_make_valve(each),) if words]
     if not desk.journal:
-        lines.append(("diagnose", *_of(desk.opened, desk.held_out, valve), *_searched(desk)))
+        lines.append(("diagnose", *_of(desk.opened, desk.held_out, valve), *_search(desk)))
     lines.append(("compare", desk.opened.name, "--valve", valve.name, *desk.opened.words))
     return tuple(desk.plain(shlex.join(("positioner", *line))) for line in lines)
 
@@ -50,7 +50,7 @@ def _seeds(valve: NamedValve, opened: Opened) -> list[int]:
     return [seed for seed in dict.fromkeys(seeds) if seed is not None]
 
 
-def _made(valve: NamedValve) -> Words:
+def _make_valve(valve: NamedValve) -> Words:
     """Return what makes a valve of the one before; nothing of one that was opened."""
     match valve.made:
         case DataSheetMade(sheet):
@@ -69,36 +69,36 @@ def _made(valve: NamedValve) -> Words:
             words += ["--without", *without] if without else []
             return (*words, "-o", valve.name)
         case Extended() as made:
-            return (*_extended(made), "-o", valve.name)
+            return (*_extend(made), "-o", valve.name)
     return ()
 
 
-def _extended(made: Extended) -> Iterator[str]:
+def _extend(made: Extended) -> Iterator[str]:
     effects = made.extension.effects
     if made.diagnosed is None:
         yield from ("extend", made.before.name, *(("--effect", *effects) if effects else ()))
-        yield from ("--fit", made.recording.name, *_held_out(made.held_out), *made.recording.words)
+        yield from ("--fit", made.recording.name, *_test_option(made.held_out), *made.recording.words)
         return
     yield from ("diagnose", *_of(made.recording, made.held_out, made.before))
-    yield from _tried(made.diagnosed.tried)
+    yield from _effects_option(made.diagnosed.tried)
     if not made.diagnosed.is_verdict:
         yield from ("--add", *effects)
 
 
-def _searched(desk: Desk) -> Words:
+def _search(desk: Desk) -> Words:
     """Return how a diagnosis that is not yet made would be."""
     budget = () if desk.budget_s == inf else ("--budget-s", f"{desk.budget_s:g}")
     found = desk.diagnosed
-    return (*budget, *_tried(found.tried if found else (*map(str, desk.effects.values()), *tried_effects())))
+    return (*budget, *_effects_option(found.tried if found else (*map(str, desk.effects.values()), *tried_effects())))
 
 
-def _tried(effects: Words) -> Words:
+def _effects_option(effects: Words) -> Words:
     return () if effects in ((), tuple(tried_effects())) else ("--effects", *effects)
 
 
 def _of(recording: Opened, held_out: Opened | None, valve: NamedValve) -> Words:
-    return (recording.name, "--valve", valve.name, *_held_out(held_out), *recording.words)
+    return (recording.name, "--valve", valve.name, *_test_option(held_out), *recording.words)
 
 
-def _held_out(held_out: Opened | None) -> Words:
+def _test_option(held_out: Opened | None) -> Words:
     return ("--test", held_out.name) if held_out else ()

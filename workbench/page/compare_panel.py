@@ -62,15 +62,15 @@ class ComparePanel:
             jumps = ui.row().classes("items-center")
         with ui.element("section").classes("together").props('data-testid="compared"'):
             with ui.column().classes("wide"):
-                self._time = FigureView(theme, self._drawn, TIME_PX, "position, error and pressure over time")
-                self._time.plot.on("plotly_relayout", self._looked_at)
-                self._time.plot.on("plotly_click", self._clicked, js_handler=POINT)
+                self._time = FigureView(theme, self._draw, TIME_PX, "position, error and pressure over time")
+                self._time.plot.on("plotly_relayout", self._handle_window)
+                self._time.plot.on("plotly_click", self._handle_click, js_handler=POINT)
                 with ui.element("div").classes("together"):
                     self._clouds = [self._cloud(over) for over in ("velocity", "position")]
                 for one, other in (self._clouds, reversed(self._clouds)):
                     one.plot.on(
                         "plotly_selected",
-                        lambda event, other=other: self._selected(event, other),
+                        lambda event, other=other: self._handle_selection(event, other),
                         js_handler=TIMES,
                     )
             with ui.column().classes("side before-plots"):
@@ -79,10 +79,10 @@ class ComparePanel:
                 ui.button("Keep this curve to compare with", icon="bookmark", on_click=self._keep).props(
                     'outline no-caps dense data-testid="keep"'
                 )
-                Sliders(self._live, desk.fitted, self._moved, self._settled, desk.units)
+                Sliders(self._live, desk.fitted, self._draw_newest, self._draw_in_full, desk.units)
         self._tell(desk.compared)
 
-    def _drawn(self) -> Figure:
+    def _draw(self) -> Figure:
         return self._figure.figure(self._theme.ink)
 
     def _cloud(self, over: str) -> FigureView:
@@ -105,7 +105,7 @@ class ComparePanel:
             self._figure.show(SAVED, self._desk.variants[SAVED])
             self._time.redraw()
 
-    def _moved(self) -> None:
+    def _draw_newest(self) -> None:
         """Draw the new curve, unless one is being drawn: then the newest when that stands, and none between."""
         self._to_draw = True
         if not self._drawing:
@@ -121,11 +121,11 @@ class ComparePanel:
                 self._error.show(self._unit.fine(rms_m))
                 await self._time.move(self._figure.data(MOVED, MOVING), MOVED_LINES)
         except TimeoutError:
-            pass  # the browser is away; what it shows when it is back, `_settled` or the next move draws
+            pass  # the browser is away; what it shows when it is back, `_draw_in_full` or the next move draws
         finally:
             self._drawing = False
 
-    async def _settled(self) -> None:
+    async def _draw_in_full(self) -> None:
         """Draw the curve in full; when the hand has come to rest, work out all that hangs on the parameters."""
         self._time.restyle(self._figure.data(MOVED), MOVED_LINES)
         if not await self._is_quiet():
@@ -136,7 +136,7 @@ class ComparePanel:
             self._forces = await aside(self._live.forces)
             if self._is_last(mine):
                 self._figure.slips = compared.slips
-                self._marked()
+                self._draw_marks()
                 self._tell(compared)
                 self._redraw_clouds()
                 self._when_settled()
@@ -162,7 +162,7 @@ class ComparePanel:
         self._fit.show(f"{compared.fit_percent:.1f} %")
         self._findings.show(compared)
 
-    def _marked(self) -> None:
+    def _draw_marks(self) -> None:
         shown = self._figure.marks()
         self._time.restyle(
             {**shown, "showlegend": [bool(x) for x in shown["x"]]}, [len(LINES) + i for i in range(len(MARKS))]
@@ -176,7 +176,7 @@ class ComparePanel:
         shapes = self._figure.shades(self._theme.ink)
         self._time.relayout({"xaxis.range": [window.begin_s, window.end_s], "shapes": shapes})
 
-    async def _looked_at(self, event: events.GenericEventArguments) -> None:
+    async def _handle_window(self, event: events.GenericEventArguments) -> None:
         window = window_of(event.args, self._figure.whole)
         if window is None:
             return
@@ -185,17 +185,17 @@ class ComparePanel:
         if await self._is_quiet():
             self._redraw_clouds()
 
-    def _clicked(self, event: events.GenericEventArguments) -> None:
+    def _handle_click(self, event: events.GenericEventArguments) -> None:
         """Go closer to a slip that is clicked, and say what the model makes of it."""
         line, at_s, said = event.args
         if line >= len(LINES):
             self._findings.tell(str(said or ""))
             self._go_to(Stretch(at_s, at_s))
 
-    def _selected(self, event: events.GenericEventArguments, other: FigureView) -> None:
+    def _handle_selection(self, event: events.GenericEventArguments, other: FigureView) -> None:
         """Mark in the plot over time, and in the other of forces, what is selected in one of forces."""
         self._figure.chosen_s = tuple(map(float, event.args))
-        self._marked()
+        self._draw_marks()
         other.redraw()
 
 

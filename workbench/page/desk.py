@@ -57,7 +57,7 @@ SAVED = "saved"
 """The line of a variant that a person keeps."""
 UNDONE = ("opened", "held_out", "export", "valve", "live", "compared", "fitted", "found", "sealed")
 """What a step back brings again."""
-MOST_UNDONE = 20
+MOST_UNDONE = 20  # steps that can be taken back
 EFFECTS, EFFECT_NAME = "effects", "[a-z][a-z0-9_]{0,39}"
 """The folder of effects of one's own; what one may be called."""
 
@@ -144,7 +144,7 @@ class Desk:
         Raises:
             InputError: it cannot be simulated, or not with this valve.
         """
-        self._held(opened, self.valve)
+        self._hold_together(opened, self.valve)
         self.export = self.sealed = self.held_out = None
 
     def hold_out(self, opened: Opened | None) -> None:
@@ -173,7 +173,7 @@ class Desk:
         Raises:
             InputError: it cannot be simulated with this recording.
         """
-        self._held(self.opened, valve)
+        self._hold_together(self.opened, valve)
 
     def blind_practice(self, seed: int) -> None:
         """Put a sealed case on the desk whose effect shows in the recording: the first from a seed on.
@@ -196,7 +196,7 @@ class Desk:
             seal(folder, hide(seed))
         opened = Opened.of(f"{folder.name}/fit.csv", folder / "fit.csv", Recording.read(folder / "fit.csv"), seed=seed)
         known = named_valve(str(folder / "valve.toml"), f"{folder.name}/valve.toml")
-        self._held(opened, replace(known, made=Hidden(seed)))
+        self._hold_together(opened, replace(known, made=Hidden(seed)))
         self.export, self.held_out, self.sealed = None, None, folder
 
     def compare(self) -> Comparison:
@@ -391,7 +391,7 @@ class Desk:
         if not self.journal:
             raise InputError("journal", "is empty")
         found = self.found
-        self._held(self.opened, refitting(self.journal[-1]).before)
+        self._hold_together(self.opened, refitting(self.journal[-1]).before)
         self.found = found
 
     @property
@@ -417,7 +417,7 @@ class Desk:
             raise InputError("workbench", "open a recording and choose a valve first")
         return self.live
 
-    def _held(self, opened: Opened | None, valve: NamedValve | None) -> None:
+    def _hold_together(self, opened: Opened | None, valve: NamedValve | None) -> None:
         """Hold a recording and a valve against each other, all found out before forgotten; if that fails, as it was."""
         live = LiveModel(opened.record, valve.file) if opened and valve else None
         compared = live.comparison() if live else None
@@ -432,7 +432,7 @@ class Desk:
         """Take a valve that was found here: the one before stays laid over it."""
         kept, before = (self.search, self.found), self._model().curve().simulated_m
         saved = {name: each for name, each in self.variants.items() if name == SAVED}
-        self._held(self.opened, valve)
+        self._hold_together(self.opened, valve)
         self.search, self.found = kept
         self.fitted = fitted
         self.variants = saved | {"as opened": before, "fitted": self._model().curve().simulated_m}

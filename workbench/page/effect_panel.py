@@ -15,7 +15,7 @@ from webpage.theme import Theme
 from workbench.page.background import Failed, Progressed
 from workbench.page.desk import Desk
 
-LOOK_S = 0.2
+PANEL_LOOK_S = 0.2
 NAME = EXAMPLE.stem.removeprefix("_")
 
 
@@ -34,11 +34,11 @@ class EffectPanel:
         with ui.row().classes("items-center"):
             self._save = ui.button("Save and check", icon="save", on_click=self._saved)
             self._save.props('no-caps data-testid="effect-save"')
-            ui.button("Take it home", icon="download", on_click=self._download).props("outline no-caps")
+            ui.button("Save and export", icon="download", on_click=self._download).props("outline no-caps")
         self._said = ui.label().props('aria-live="polite" data-testid="effect-said"').style("white-space: pre-wrap")
         self._kept = ui.row().classes("items-center")
         self._list()
-        ui.timer(LOOK_S, self._look)
+        ui.timer(PANEL_LOOK_S, self._look)
 
     def _dress(self) -> None:
         if not self._editor.is_deleted:

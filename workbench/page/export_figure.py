@@ -6,7 +6,7 @@ from webpage.units import Unit, Units
 from workbench.report.charts import Figure, axis, layout
 from workbench.report.plot_series import extremes, rounded, running_s
 
-MOST_POINTS = 900
+MOST_DRAWN_POINTS = 900  # more than a screen has columns
 
 
 def export_figure(recording: Recording, stroke_m: float, units: Units, ink: Ink) -> Figure:
@@ -32,7 +32,7 @@ def export_figure(recording: Recording, stroke_m: float, units: Units, ink: Ink)
 
 def _line(along_s: Column, values: Column, told: tuple[str, Unit, str], colour: str) -> Figure:
     name, unit, y_axis = told
-    rows = extremes(values, MOST_POINTS)
+    rows = extremes(values, MOST_DRAWN_POINTS)
     return {
         "type": "scatter", "mode": "lines", "name": name, "yaxis": y_axis, "line": {"color": colour, "width": 1.3},
         "x": rounded(along_s[rows], 4), "y": rounded(unit.per_si * values[rows], 5),

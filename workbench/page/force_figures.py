@@ -17,7 +17,7 @@ from workbench.page.time_figure import Window
 from workbench.report.charts import Figure, axis, layout
 from workbench.report.plot_series import rounded
 
-TIME_PLACES = 4
+TIME_PLACES = 4  # digits after the point
 MOST_CLOUD_POINTS = 700
 """Points of a cloud."""
 OVER = {"velocity": ("velocity, {}/s (opening +)", "velocity_m_per_s"), "position": ("position, {}", "position_m")}
@@ -47,7 +47,7 @@ def force_figure(over: str, clouds: tuple[Forces, Forces], seen: Seen, unit: Uni
     traces = []
     kinds = (("measured", ink.measured, clouds[0], "circle-open", 7), ("model", ink.model, clouds[1], "circle", 3))
     for name, colour, cloud, symbol, size in kinds:
-        rows = _thinned(cloud.friction_n.size)
+        rows = _thin_rows(cloud.friction_n.size)
         at_s = cloud.time_s[rows] - seen.begin_s
         inside = (at_s >= seen.window.begin_s) & (at_s <= seen.window.end_s)
         chosen = np.isin(np.round(at_s, TIME_PLACES), np.round(np.array(seen.chosen_s), TIME_PLACES))
@@ -79,5 +79,5 @@ def _cloud(
     }  # fmt: skip
 
 
-def _thinned(count: int) -> NDArray[np.int64]:
+def _thin_rows(count: int) -> NDArray[np.int64]:
     return np.unique(np.linspace(0, max(0, count - 1), min(count, MOST_CLOUD_POINTS)).astype(np.int64))

@@ -30,7 +30,7 @@ class JournalPanel:
         self._changed = changed
         if desk.journal:
             heading("How the error fell", "journal")
-            FigureView(theme, self._drawn, FALL_PX, "how the error fell")
+            FigureView(theme, self._draw, FALL_PX, "how the error fell")
             ui.label("dashed: the floor").classes("quiet")
             for number, step in enumerate(map(refitting, desk.journal), start=1):
                 ui.label(desk.plain(f"{number}. {step.extension.summary().splitlines()[0]}")).props(
@@ -38,7 +38,7 @@ class JournalPanel:
                 )
             back = ui.button("Take the last step back", icon="undo", on_click=self._back)
             back.props('outline no-caps data-testid="back"')
-        heading("Take it home")
+        heading("Save and export")
         with ui.row():
             ui.button("Valve file", icon="save", on_click=self._save).props('no-caps data-testid="save"')
             ui.button("Report", icon="description", on_click=self._report).props("outline no-caps")
@@ -58,7 +58,7 @@ class JournalPanel:
         with self._commands, errors_told():
             ui.code("\n".join(command_lines(self._desk)), language="bash").classes("w-full")
 
-    def _drawn(self) -> Figure:
+    def _draw(self) -> Figure:
         """Every model on the way, as the report of a journal draws it: fitted, held out, and the floor."""
         stages = []
         extensions = [refitting(each).extension for each in self._desk.journal]

@@ -178,7 +178,7 @@ class LiveModel:
         run = self._run.run(self._effective())
         measured = [self._forces(run, self.record.position_m, each) for each in self.record.segments]
         model = [self._forces(run, run.indicated_m, each) for each in self.record.segments]
-        return _joined(measured), _joined(model)
+        return _join_parts(measured), _join_parts(model)
 
     def _forces(self, run: Run, position_m: Column, segment: tuple[int, int]) -> Forces:
         rows = slice(*segment)
@@ -240,6 +240,6 @@ def _put(theta: Vector, parameter: Parameter, share: float) -> None:
     parameter.put(theta, least + min(max(share, 0.0), 1.0) * (most - least))
 
 
-def _joined(parts: list[Forces]) -> Forces:
+def _join_parts(parts: list[Forces]) -> Forces:
     names = ("time_s", "position_m", "velocity_m_per_s", "direction", "pressure_pa", "friction_n")
     return Forces(*(np.concatenate([getattr(part, name) for part in parts]) for name in names))

@@ -45,7 +45,7 @@ def _cells(desk: Desk) -> Iterator[tuple[str, str]]:
     for each, name in names.items():
         yield "code", f"{name} = {_read(each) if each.seed is None else f'pos.hide({each.seed}).fit'}"
     for link in valve.chain:
-        for code in _made(desk, link, names):
+        for code in _make_valve(desk, link, names):
             yield "code", code
     yield "code", f"compared = pos.compare({names[desk.opened]}, valve)\ncompared"
     yield "code", "compared.plot();"
@@ -56,7 +56,7 @@ def _cells(desk: Desk) -> Iterator[tuple[str, str]]:
         tried = (*own, *tried_effects()) if own else ()
         tried = desk.diagnosed.tried if desk.diagnosed else tried
         held_out = names[desk.held_out] if desk.held_out else None
-        yield "code", f"{_diagnosed(desk, names[desk.opened], held_out, tried)}{budget}\nfound"
+        yield "code", f"{_diagnose(desk, names[desk.opened], held_out, tried)}{budget}\nfound"
     else:
         yield "code", 'pos.write_valve(Path("better.toml"), valve)'
 
@@ -72,7 +72,7 @@ def _recordings(desk: Desk) -> dict[Opened, str]:
     return named | {each: "held_out" if i == 1 else f"held_out_{i}" for i, each in enumerate(others, start=1)}
 
 
-def _made(desk: Desk, valve: NamedValve, names: Mapping[Opened, str]) -> Iterator[str]:
+def _make_valve(desk: Desk, valve: NamedValve, names: Mapping[Opened, str]) -> Iterator[str]:
     """Yield what makes a valve of the one before, or reads the one that was opened."""
     made = valve.made
     if not isinstance(made, Extended):
@@ -87,7 +87,7 @@ def _made(desk: Desk, valve: NamedValve, names: Mapping[Opened, str]) -> Iterato
     test = f", test={held_out}" if held_out else ""
     effects = [desk.plain(each) for each in made.extension.effects]
     if made.diagnosed:
-        yield f"{_diagnosed(desk, recording, held_out, made.diagnosed.tried)}\nfound"
+        yield f"{_diagnose(desk, recording, held_out, made.diagnosed.tried)}\nfound"
     if made.diagnosed and made.diagnosed.is_verdict:
         yield "valve = found.best.fit.valve"
         return
@@ -95,7 +95,7 @@ def _made(desk: Desk, valve: NamedValve, names: Mapping[Opened, str]) -> Iterato
     yield f"better = pos.extend({recording}, valve, {effects!r}{test}{on})\nvalve = better.valve\nbetter"
 
 
-def _diagnosed(desk: Desk, recording: str, held_out: str | None, tried: Sequence[str]) -> str:
+def _diagnose(desk: Desk, recording: str, held_out: str | None, tried: Sequence[str]) -> str:
     test = f", test={held_out}" if held_out else ""
     named = [desk.plain(each) for each in tried]
     effects = f", effects={named!r}" if tried and tuple(tried) != tuple(tried_effects()) else ""

@@ -62,46 +62,46 @@ class OpenPanel:
             said = wrong_with(desk.opened, stroke_m)
             sentences(said or ("nothing in it had to be left out or cut",), "wrong")
             if desk.live is not None:
-                self._held_out()
+                self._offer_second()
             if desk.valve is None:
-                ui.label("now choose a valve").classes("quiet")
+                ui.label("choose a valve").classes("quiet")
 
     def _recording(self, files: Sequence[Path]) -> None:
         heading("Recording")
-        drop_box("drop a recording here, or press +: CSV, Excel, MATLAB, Parquet", "drop", self._dropped)
-        self._offered(files)
+        drop_box("drop a recording here, or press +: CSV, Excel, MATLAB, Parquet", "drop", self._handle_drop)
+        self._offer_files(files)
         with ui.row().classes("items-center"):
             ui.button("Blind practice", icon="visibility_off", on_click=self._blind).props("outline no-caps")
-            ui.label("a recording with a hidden effect that shows in it, its answer sealed").classes("quiet")
+            ui.label("a recording with a hidden effect; the answer is sealed").classes("quiet")
 
-    def _offered(self, files: Sequence[Path]) -> None:
+    def _offer_files(self, files: Sequence[Path]) -> None:
         """Offer the files of a command line, a line a folder: each is a button, of many folders' a list."""
         if len(files) > MOST_BUTTONS:
             names = [str(path) for path in files]
-            listed = ui.select(names, label="or one of the folder", on_change=lambda event: self._chosen(event.value))
+            listed = ui.select(
+                names, label="or one of the folder", on_change=lambda event: self._handle_choice(event.value)
+            )
             listed.classes("w-full").props('data-testid="files"')
             return
         for folder, group in groupby(files, key=lambda path: path.parent):
             with ui.row().classes("items-center w-full").style("gap: 4px").props('data-testid="files"'):
                 ui.label(f"{folder.resolve().name}:").classes("quiet")
                 for path in group:
-                    button = ui.button(path.name, on_click=lambda path=path: self._chosen(str(path)))
+                    button = ui.button(path.name, on_click=lambda path=path: self._handle_choice(str(path)))
                     button.props("outline dense no-caps")
 
-    def _held_out(self) -> None:
+    def _offer_second(self) -> None:
         """Offer to take a second recording for what no fit sees."""
         held = self._desk.held_out
         said = f"held out: {held.name}" if held else "held out: the last third of it"
         with ui.expansion(said, icon="content_cut").classes("w-full").props('data-testid="held-out"'):
-            drop_box("drop another recording of the same valve", "drop-held-out", self._held_dropped)
+            drop_box("drop another recording of the same valve", "drop-held-out", self._handle_second_drop)
             if held:
-                ui.button("Hold out the last third again", on_click=lambda: self._hold_out(None)).props(
-                    "outline no-caps"
-                )
+                ui.button("Hold out the last third", on_click=lambda: self._hold_out(None)).props("outline no-caps")
 
-    async def _held_dropped(self, event: events.UploadEventArguments) -> None:
+    async def _handle_second_drop(self, event: events.UploadEventArguments) -> None:
         assert self._desk.opened is not None
-        path = await self._kept(event)
+        path = await self._keep_file(event)
         event.sender.run_method("reset")
         with errors_told({str(path): event.file.name, "recording": event.file.name}):
             await self._hold_out(await aside(opened_like, path, event.file.name, self._desk.opened))
@@ -113,7 +113,7 @@ class OpenPanel:
     def _valve(self) -> None:
         heading("Valve")
         shipped = sorted(path.stem for path in (SHIPPED / "valves").glob("*.toml"))
-        self._names = ui.select(shipped, label="valve", on_change=lambda event: self._named(event.value))
+        self._names = ui.select(shipped, label="valve", on_change=lambda event: self._handle_name(event.value))
         self._names.classes("w-full").props('data-testid="valve"')
         drop_box("or drop a valve file, .toml", "drop-valve", self._valve_dropped, ".toml")
         with ui.expansion("from a data sheet", icon="straighten").classes("w-full"):
@@ -147,13 +147,13 @@ class OpenPanel:
             each.classes("w-full").props("dense")
         ui.button("Make the valve", on_click=made).props("outline no-caps")
 
-    async def _dropped(self, event: events.UploadEventArguments) -> None:
-        path = await self._kept(event)
+    async def _handle_drop(self, event: events.UploadEventArguments) -> None:
+        path = await self._keep_file(event)
         event.sender.run_method("reset")
         with errors_told({str(path): event.file.name, "recording": event.file.name}):
             await self._found(await aside(opened, path, event.file.name))
 
-    async def _chosen(self, text: str) -> None:
+    async def _handle_choice(self, text: str) -> None:
         path = Path(text)
         with errors_told():
             await self._found(await aside(opened, path, text))
@@ -174,12 +174,12 @@ class OpenPanel:
         self._changed()
 
     async def _valve_dropped(self, event: events.UploadEventArguments) -> None:
-        path = await self._kept(event)
+        path = await self._keep_file(event)
         event.sender.run_method("reset")
         with errors_told({str(path): path.name, "valve file": path.name}):
             await self._take_valve(str(path), path.name)
 
-    async def _named(self, name: str | None) -> None:
+    async def _handle_name(self, name: str | None) -> None:
         if name is None or (self._desk.valve and self._desk.valve.name == name):
             return
         with errors_told():
@@ -201,7 +201,7 @@ class OpenPanel:
         self._names.set_value(name)
         self._names.update()
 
-    async def _kept(self, event: events.UploadEventArguments) -> Path:
+    async def _keep_file(self, event: events.UploadEventArguments) -> Path:
         """Keep a dropped file under its last name, which says what kind it is; nothing else of its path is taken."""
         path = self._desk.folder / Path(event.file.name).name
         await event.file.save(path)

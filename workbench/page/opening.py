@@ -135,10 +135,10 @@ def opened(path: Path, name: str) -> Opened | Export:
     if recording is not None:
         return Opened.of(name, path, recording)
     found = preview(path)
-    return Export(name, path, found, _proposed(found))
+    return Export(name, path, found, _read_proposal(found))
 
 
-def _proposed(found: ExportPreview) -> ColumnChoice:
+def _read_proposal(found: ExportPreview) -> ColumnChoice:
     columns, time_format, status = dict.fromkeys(OURS, ""), "", []
     for flag, word in zip(found.words, found.words[1:], strict=False):
         if flag == "--column":

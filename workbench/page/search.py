@@ -8,7 +8,7 @@ from workbench.page.opening import Opened
 from workbench.page.provenance import Diagnosed, NamedValve
 from workbench.select.tangent_preview import TangentScore
 
-PREVIEWED = 5
+PREVIEWED = 5  # effects in the line of the preview
 
 
 @dataclass(slots=True)

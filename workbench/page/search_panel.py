@@ -23,7 +23,7 @@ from workbench.report.diagnosis_report import ranked
 from workbench.report.effects_table import headline
 from workbench.report.ranking import log_ticks
 
-LOOK_S = 0.2
+PANEL_LOOK_S = 0.2
 LEAST_BUDGET_S = 1.0
 ROW_PX, FRAME_PX = 18, 70
 
@@ -52,10 +52,10 @@ class SearchPanel:
             self._cancel = ui.button("Cancel", icon="close", on_click=self._stop).props(
                 "outline no-caps color=negative"
             )
-            self._budget = NumberField("at most, s", _shown(desk.budget_s), name="at most, s")
+            self._budget = NumberField("at most, s", _show_budget(desk.budget_s), name="at most, s")
             self._budget.props('dense clearable data-testid="budget"').style("width: 110px")
-            self._budget.on("blur", self._typed).tooltip("after so long it says what is known then")
-            names = ui.select(self._tried(), label="effects tried (all)", multiple=True, clearable=True)
+            self._budget.on("blur", self._handle_text).tooltip("after so long it says what is known then")
+            names = ui.select(self._list_effects(), label="effects tried (all)", multiple=True, clearable=True)
             self._names = names.props('use-chips dense data-testid="effects"').style("min-width: 260px")
         with ui.column().classes("w-full") as self._progress:
             self._doing = ui.label().props('data-testid="doing" aria-live="polite"')
@@ -67,14 +67,14 @@ class SearchPanel:
         self._race = ui.column().classes("w-full")
         self._raced: tuple[int, int] = (0, 0)
         self._view: FigureView | None = None
-        effect_section(desk, theme, self._joined)
-        ui.timer(LOOK_S, self._look)
+        effect_section(desk, theme, self._update_names)
+        ui.timer(PANEL_LOOK_S, self._look)
         self._show()
         self._show_race()
         if desk.found is not None:
             self._tell(desk.found)
 
-    def _typed(self) -> None:
+    def _handle_text(self) -> None:
         with errors_told():
             self._take_budget()
 
@@ -91,10 +91,10 @@ class SearchPanel:
             )
         self._desk.budget_s = inf if budget_s is None else budget_s
 
-    def _joined(self) -> None:
-        self._names.set_options(self._tried(), value=self._names.value)
+    def _update_names(self) -> None:
+        self._names.set_options(self._list_effects(), value=self._names.value)
 
-    def _tried(self) -> dict[str, str]:
+    def _list_effects(self) -> dict[str, str]:
         """Return what may be tried, and what it is called: one's own effects are named by their paths."""
         own = {str(path): name for name, path in self._desk.effects.items()}
         return own | {name: name for name in tried_effects()}
@@ -102,7 +102,7 @@ class SearchPanel:
     def _diagnose(self) -> None:
         with errors_told():
             self._take_budget()
-            self._desk.diagnose(self._names.value or list(self._tried()))
+            self._desk.diagnose(self._names.value or list(self._list_effects()))
         self._began()
 
     def _extend(self, effects: Sequence[str]) -> None:
@@ -180,11 +180,11 @@ class SearchPanel:
             self._race.clear()
             with self._race:
                 height_px = FRAME_PX + ROW_PX * len(search.race)
-                self._view = FigureView(self._theme, self._drawn, height_px, "race of the candidates")
+                self._view = FigureView(self._theme, self._draw, height_px, "race of the candidates")
         else:
             self._view.redraw()
 
-    def _drawn(self) -> Figure:
+    def _draw(self) -> Figure:
         search, compared = self._desk.search, self._desk.compared
         race = {} if search is None else dict(sorted(search.race.items(), key=lambda each: -each[1]))
         of = self._desk.errors
@@ -203,7 +203,7 @@ class SearchPanel:
                 xaxis=axis(f"step {step}: fitted error, {of.unit} rms", type="log", **log_ticks([*errors, *floors])),
                 yaxis=axis("", tickfont={"size": 11}),
                 shapes=[marked(each, MEASURED) for each in floors],
-                annotations=[_named_floor(each) for each in floors],
+                annotations=[_label_floor(each) for each in floors],
                 showlegend=False,
             ),
         }
@@ -250,12 +250,12 @@ class SearchPanel:
                 add.props('no-caps data-testid="add-form"')
             else:
                 text = discovery.found[0].text(search.recording.name)
-                ui.button("Take it home", icon="download", on_click=lambda: ui.download.content(text, "found.py"))
+                ui.button("Save and export", icon="download", on_click=lambda: ui.download.content(text, "found.py"))
 
     def _add_form(self, search: Search) -> None:
         with errors_told():
             self._desk.extend_by_form(search)
-        self._joined()
+        self._update_names()
         self._began()
 
     def _candidates(self, diagnosis: Diagnosis, number: int, *, may_add: bool) -> None:
@@ -285,7 +285,7 @@ class SearchPanel:
         table.add_slot("body-cell-effect", ADDING_CELL if may_add else EFFECT_CELL)
         if may_add:
             table.on("add", lambda event: self._extend(event.args["effects"]))
-            ui.label("press an effect to add it all the same").classes("quiet")
+            ui.label("press an effect to add it in any case").classes("quiet")
 
     async def _add(self, search: Search, effects: Sequence[str]) -> None:
         """Add what was found: what is sure is not fitted again, one of several is."""
@@ -297,11 +297,11 @@ class SearchPanel:
             self._changed("journal")
 
 
-def _named_floor(floor: float) -> Figure:
+def _label_floor(floor: float) -> Figure:
     """Return what stands over the line of the floor, on an axis that is logarithmic."""
     where = {"x": log10(floor), "y": 1.0, "yref": "paper", "yanchor": "bottom"}
     return {"text": "floor", "showarrow": False, **where}
 
 
-def _shown(budget_s: float) -> float | None:
+def _show_budget(budget_s: float) -> float | None:
     return None if budget_s == inf else budget_s

@@ -16,7 +16,7 @@ from workbench.page.explained import about_effect, explained
 from workbench.page.live_model import LiveModel
 from workbench.report.units import parameter as in_words
 
-STEP = 0.0005
+SLIDER_STEP = 0.0005
 """Of the way of a slider: of a range of a factor 2500 a step is 0.4 %."""
 MOVES_EVERY_S = 0.02
 """While a slider is dragged: what comes faster is left out by the browser."""
@@ -29,7 +29,9 @@ class Slider(ValueElement[float]):
 
     def __init__(self, value: float, name: str, words: str) -> None:
         super().__init__(tag="q-slider", value=value, throttle=MOVES_EVERY_S)
-        self.props.update({"min": 0.0, "max": 1.0, "step": STEP, "aria-label": words, "data-testid": f"slider-{name}"})
+        self.props.update(
+            {"min": 0.0, "max": 1.0, "step": SLIDER_STEP, "aria-label": words, "data-testid": f"slider-{name}"}
+        )
 
 
 @dataclass(frozen=True, slots=True)
@@ -78,7 +80,7 @@ class Sliders:
             for name, written in zip(live.effects, live.written, strict=True):
                 with ui.row().classes("items-center").style("gap: 4px"):
                     self._switches[name] = ui.switch(
-                        "", value=True, on_change=lambda event, name=name: self._switched(name, event)
+                        "", value=True, on_change=lambda event, name=name: self._handle_switch(name, event)
                     ).props(f'data-testid="switch-{name}" aria-label="{name}"')
                     explained(name, about_effect(written))
         undo = ui.button("Undo", icon="undo", on_click=self._undo).props('outline no-caps dense data-testid="undo"')
@@ -98,7 +100,7 @@ class Sliders:
                         f'dense outlined placeholder="type" data-testid="type-{parameter.name}" aria-label="{words}"'
                     )
                     typed.props(remove="label").classes("typed").style("width: 72px").on(
-                        "keydown.enter", lambda: self._typed(parameter, typed, factor)
+                        "keydown.enter", lambda: self._handle_text(parameter, typed, factor)
                     )
             slider = Slider(self._live.share(parameter), parameter.name, words)
             low, high = (factor * self._live.value_at(parameter, share) for share in (0.0, 1.0))
@@ -107,11 +109,11 @@ class Sliders:
                 interval = " to ".join(f"{factor * each:.4g}" for each in (fitted.lower, fitted.upper))
                 told += f"; fitted {factor * fitted.value:.4g} ({interval})"
             ui.label(told).classes("quiet")
-        slider.on_value_change(lambda event: self._dragged(parameter, event.value))
-        slider.on("change", lambda event: self._released(parameter, slider, event.args))
+        slider.on_value_change(lambda event: self._handle_drag(parameter, event.value))
+        slider.on("change", lambda event: self._handle_release(parameter, slider, event.args))
         return Row(parameter, slider, value, factor, unit)
 
-    def _dragged(self, parameter: Parameter, share: float) -> None:
+    def _handle_drag(self, parameter: Parameter, share: float) -> None:
         if self._following:
             return
         if not self._held and (parameter.name, share) == self._let_go:
@@ -124,7 +126,7 @@ class Sliders:
         self._show_values()
         self._moved()
 
-    async def _typed(self, parameter: Parameter, typed: NumberField, factor: float) -> None:
+    async def _handle_text(self, parameter: Parameter, typed: NumberField, factor: float) -> None:
         """Take a number that was typed beside a slider."""
         with errors_told({parameter.name: f"{in_words(parameter.name)[0]}, SI"}):
             value = typed.number()
@@ -137,15 +139,15 @@ class Sliders:
             self._moved()
             await self._settled()
 
-    async def _released(self, parameter: Parameter, slider: Slider, share: float) -> None:
+    async def _handle_release(self, parameter: Parameter, slider: Slider, share: float) -> None:
         """Take where the slider was let go: the last move may still be on its way."""
-        self._dragged(parameter, share)
+        self._handle_drag(parameter, share)
         slider.update()  # the browser moved it by itself: `undo` must find it where it is
         self._held, self._let_go = False, (parameter.name, share)
         self._follow()
         await self._settled()
 
-    async def _switched(self, name: str, event: events.ValueChangeEventArguments[bool]) -> None:
+    async def _handle_switch(self, name: str, event: events.ValueChangeEventArguments[bool]) -> None:
         if self._following:
             return
         self._live.switch(name, bool(event.value))

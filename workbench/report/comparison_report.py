@@ -289,11 +289,11 @@ def _slips(each: Comparison) -> Html:
             f"{_at(slips.missed_s)}. Spurious, the model slipped and the stem did not: {len(slips.spurious_s)}"
             f"{_at(slips.spurious_s)}."
         ),
-        *(_matched_slips(rows, read) if rows else ()),
+        *(_list_slips(rows, read) if rows else ()),
     )
 
 
-def _matched_slips(rows: list[Row], read: Reading) -> tuple[Html, Html]:
+def _list_slips(rows: list[Row], read: Reading) -> tuple[Html, Html]:
     head = ["Matched slips", "Number", "Model later by, s", read.title("Model farther by, mm")]
     return table("table-slips", head, rows), text("Medians; a minus: earlier, or not far enough.")
 

@@ -100,7 +100,7 @@ def report_diagnosis(diagnosis: Diagnosis, path: Path, subject: Subject, command
             *([] if validation.base.by_setpoint else [_signature(validation)]),
             _where(validation),
             _ranking(diagnosis, validation),
-            _added(diagnosis),
+            _section_of_added(diagnosis),
             not_told_apart(diagnosis.indistinguishable, _names(diagnosis), diagnosis.missing, "see the next section"),
             _next(diagnosis, commands),
             _undetectable(diagnosis),
@@ -268,7 +268,7 @@ def ranked(step: EffectStep) -> list[RankedEffect]:
     ]
 
 
-def _added(diagnosis: Diagnosis) -> Html:
+def _section_of_added(diagnosis: Diagnosis) -> Html:
     read = Reading(diagnosis.kind)
     names = dict.fromkeys([*diagnosis.base.fit.parameters, *diagnosis.best.fit.parameters])
     rows = [

@@ -82,14 +82,14 @@ def tried_effects(steps: Sequence[RankedStep], floor: float | None, of: Quantity
                     "Evidence, held out",
                     "Evidence",
                 ],
-                [_ranked(each, of) for each in rows],
+                [_row_of(each, of) for each in rows],
                 (0, 1),
             ),
         ]
     return section("ranking", "The effects that were tried", *shown)
 
 
-def _ranked(each: RankedEffect, of: Quantity) -> Row:
+def _row_of(each: RankedEffect, of: Quantity) -> Row:
     return Row(
         [
             each.name,

@@ -35,7 +35,7 @@ from workbench.report.plot_series import rounded
 from workbench.report.ranking import RankedEffect
 from workbench.report.units import FORCE, Shown, force, parameter, times
 
-DRAWN = 6_000
+DRAWN_ROWS = 6_000
 """Rows drawn at most."""
 LARGE_DOT_ROWS = 200
 """Rows below which a dot is drawn large."""
@@ -146,7 +146,7 @@ def _fall(diagnosis: ForceDiagnosis) -> Html:
 
 def _friction(diagnosis: ForceDiagnosis, measured_n: Column) -> Html:
     rows, best = diagnosis.rows, diagnosis.best
-    every = -(-len(rows) // DRAWN)
+    every = -(-len(rows) // DRAWN_ROWS)
     left_n = (measured_n - carried_n(rows, best.parameters))[::every]
     explained_n = left_n - best.residual_n[::every]
     place = rounded(1e3 * rows.position_m[::every], 4)
@@ -231,11 +231,11 @@ def _means(over: Column, values: Column) -> Profile:
 
 
 def _ranking(diagnosis: ForceDiagnosis) -> Html:
-    steps = [RankedStep(step.before.effects, step.before.test_rms_n, _tried(step)) for step in diagnosis.steps]
+    steps = [RankedStep(step.before.effects, step.before.test_rms_n, _list_tried(step)) for step in diagnosis.steps]
     return tried_effects(steps, None, FORCE)
 
 
-def _tried(step: ForceStep) -> list[RankedEffect]:
+def _list_tried(step: ForceStep) -> list[RankedEffect]:
     added, rivals = step.added.name if step.added else "", [each.name for each in step.indistinguishable]
     return [
         RankedEffect(

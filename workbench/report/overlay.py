@@ -60,7 +60,7 @@ class Asked(NamedTuple):
     """After the point, in SI."""
 
 
-def _asked(read: Reading, by_setpoint: bool) -> Asked:
+def _command_label(read: Reading, by_setpoint: bool) -> Asked:
     length, command = read.kind.length, read.kind.command.read
     if by_setpoint:
         return Asked("set point", length.unit, read.si, length.factor, 7)
@@ -92,7 +92,7 @@ def overlay(
     if slips is not None and bool(np.all(np.diff(time_s) > 0.0)):
         traces += _marks(time_s, measured_m, slips)
     command = drawn(time_s, command_pa)
-    asked = _asked(read, by_setpoint)
+    asked = _command_label(read, by_setpoint)
     traces.append(
         line(
             rounded(command.time_s, 5),

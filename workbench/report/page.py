@@ -69,7 +69,7 @@ def write(path: Path, title: str, parts: Iterable[Html]) -> None:
     Raises:
         InputError: plotly is not installed, or the file cannot be written.
     """
-    _write(path, title, parts, require_plotly(path), _shipped("page.js"))
+    _write(path, title, parts, require_plotly(path), _read_shipped("page.js"))
 
 
 def write_without_plots(path: Path, title: str, parts: Iterable[Html]) -> None:
@@ -82,9 +82,9 @@ def write_without_plots(path: Path, title: str, parts: Iterable[Html]) -> None:
 
 
 def _write(path: Path, title: str, parts: Iterable[Html], library: str, script: str) -> None:
-    page = Template(_shipped("page.html")).substitute(
+    page = Template(_read_shipped("page.html")).substitute(
         title=escape(title),
-        style=_shipped("page.css"),
+        style=_read_shipped("page.css"),
         body="\n".join(parts),
         plotly=library,
         script=script,
@@ -202,11 +202,11 @@ def _cells(row: Row, left: set[int]) -> str:
     ]
     return "".join(
         f"<td{_class(i in left)}{_si(value)}>{escape(value.text)}{more}</td>"
-        for i, (value, more) in enumerate(zip(map(_shown, row.cells), beside, strict=True))
+        for i, (value, more) in enumerate(zip(map(_as_shown, row.cells), beside, strict=True))
     )
 
 
-def _shown(cell: str | Shown) -> Shown:
+def _as_shown(cell: str | Shown) -> Shown:
     return Shown(cell) if isinstance(cell, str) else cell
 
 
@@ -230,5 +230,5 @@ def _lines(parts: Iterable[Html]) -> str:
     return "\n".join(part for part in parts if part)
 
 
-def _shipped(name: str) -> str:
+def _read_shipped(name: str) -> str:
     return (HERE / name).read_text(encoding="utf-8")

@@ -43,7 +43,7 @@ class Authority:
         self._folder = folder
         self._days = days
         self._key = ec.generate_private_key(ec.SECP256R1())
-        self._name = _called("test authority")
+        self._name = _common_name("test authority")
         usage = x509.KeyUsage(**{each: each in ("key_cert_sign", "crl_sign") for each in _USES})
         built = (
             self._builder(self._name, self._key, datetime.now(UTC), days)
@@ -59,7 +59,7 @@ class Authority:
             FileExistsError: there is one of that name already.
         """
         key = ec.generate_private_key(ec.SECP256R1())
-        built = self._builder(_called(owner.name), key, since or datetime.now(UTC), self._days)
+        built = self._builder(_common_name(owner.name), key, since or datetime.now(UTC), self._days)
         built = built.add_extension(x509.BasicConstraints(ca=False, path_length=None), critical=True)
         if purposes := _purposes(owner):
             built = built.add_extension(x509.ExtendedKeyUsage(purposes), critical=False)
@@ -109,7 +109,7 @@ _USES = (
 )
 
 
-def _called(name: str) -> x509.Name:
+def _common_name(name: str) -> x509.Name:
     return x509.Name([x509.NameAttribute(NameOID.COMMON_NAME, name)])
 
 

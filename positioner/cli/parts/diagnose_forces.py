@@ -29,7 +29,7 @@ def run_forces(arguments: argparse.Namespace) -> int:
     test = read_imposed(arguments.test) if arguments.test else None
     with naming({"recording": ", ".join(map(str, arguments.recordings)), "valve file": arguments.valve}):
         diagnosis = diagnose_forces(recordings, valve, test=test)
-    print("no command in it: a balance of forces, not a simulation")
+    print("the recording has no command: forces are balanced, nothing is simulated")
     print(diagnosis.summary())
     if arguments.json is not None:
         whole = as_json(diagnosis) | {"seconds": time.monotonic() - began_s}

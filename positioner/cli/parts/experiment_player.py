@@ -20,11 +20,11 @@ if TYPE_CHECKING:
     from workbench.discriminate.experiment_design import DesignedExperiment
 
 RECORDED_WITHIN_S = 30.0
-POLL_S = 0.3
+PLAY_POLL_S = 0.3
 LATEST_FILES = 2
 """Of the recorder, in which an experiment may lie."""
-HELD_CYCLES = 1.5
-SAME, MOSTLY = 0.01, 0.95
+HELD_CYCLES = 1.5  # a register holds so long that no cycle misses it
+SAME, LEAST_PLAYED_SHARE = 0.01, 0.95
 """Of the sequence's pressures, and of its length: farther from them, or for less, a recording is of something else."""
 
 
@@ -53,7 +53,9 @@ def require_ready(file: "DaemonFile", arguments: argparse.Namespace) -> None:
         if dcs.get("experiment_veto"):
             raise CommandFailed("experiments are vetoed: positioner set experiment_veto 0")
         if dcs.get("experiment_state") in (ExperimentState.UNDER_WAY, ExperimentState.RETURNING):
-            raise CommandFailed("an experiment is under way already: wait for its end, or break it off by a veto")
+            raise CommandFailed(
+                "an experiment is under way: wait for its end, or end it: positioner set experiment_veto 1"
+            )
         least, most = file.experiment.travel_window
         position = float(dcs.get("position"))
         if (least > 0.0 and position < least) or (most < 1.0 and position > most):  # 0 and 1 are the stops
@@ -155,7 +157,7 @@ def recorded(folder: Path, valve: str, points: tuple[tuple[float, float], ...]) 
     while time.monotonic() < due_s:
         if found := last_excited(folder, valve):
             return found if not points or is_of(found, points) else None
-        time.sleep(POLL_S)
+        time.sleep(PLAY_POLL_S)
     return None
 
 
@@ -201,7 +203,7 @@ def is_of(recording: Recording, points: tuple[tuple[float, float], ...]) -> bool
         apart_pa = np.abs(np.interp(begin_s + wanted_s, time_s, recording.command_pa) - wanted_pa)
         return float(np.mean((apart_pa < allowed_pa) & (begin_s + wanted_s <= time_s[-1])))
 
-    return any(share(begin_s) > MOSTLY for begin_s in np.linspace(0.0, latest_s, 200).tolist())
+    return any(share(begin_s) > LEAST_PLAYED_SHARE for begin_s in np.linspace(0.0, latest_s, 200).tolist())
 
 
 def _read(path: Path) -> Recording | None:

@@ -15,7 +15,7 @@ if TYPE_CHECKING:
 
 BESIDES = ("stroke_m", "range_pa", "decimal", "time_format", "status", "sheet", "period_s")
 """Options that say how mapped columns are read."""
-LARGE = 50_000_000
+LARGE_FILE_BYTES = 50_000_000
 """Bytes of a file whose reading takes seconds."""
 
 
@@ -31,11 +31,11 @@ def add_export_arguments(parser: argparse.ArgumentParser) -> None:
         action="append",
         default=[],
         metavar="OURS=THEIRS:UNIT",
-        help="our column, theirs and its unit, once for each: time_s=Time position_m=PV:%% command_pa=OUT:bar. "
+        help="our column = column of the file : its unit, once for each column, as position_m=PV:%%. "
         "#2 is the second column, Date+Time joins two, -%% counts from the other end",
     )
     export.add_argument(
-        "--mapping", type=Path, metavar="MAP.toml", help="take all of these words from a file; typed ones win"
+        "--mapping", type=Path, metavar="MAP.toml", help="read these options from a file; the command line wins"
     )
     export.add_argument("--stroke-m", type=_stroke, metavar="M", help="100 %% of a position (the valve file's stroke)")
     export.add_argument(
@@ -43,26 +43,26 @@ def add_export_arguments(parser: argparse.ArgumentParser) -> None:
         type=_pressure,
         nargs=2,
         metavar=("AT0", "AT100"),
-        help="pressures of 0 %% and 100 %% (20e3 100e3 is assumed, and told)",
+        help="pressures of 0 %% and 100 %% (20e3 100e3, with a note)",
     )
     export.add_argument(
         "--period-s", type=_period, metavar="S", help="time between the rows of a file without a time column"
     )
-    export.add_argument("--decimal", choices=(".", ","), help="the decimal sign (where the numbers leave it open)")
+    export.add_argument("--decimal", choices=(".", ","), help="the decimal sign, where the file leaves it open")
     export.add_argument(
         "--time-format",
         metavar="FORMAT",
-        help='how dates are written, "%%d.%%m.%%Y %%H:%%M:%%S" (ISO and seconds need none)',
+        help='format of the dates, as "%%d.%%m.%%Y %%H:%%M:%%S"; not needed for ISO and seconds',
     )
     export.add_argument(
         "--status",
         action="append",
         default=[],
         metavar="THEIRS=GOOD,..",
-        help="a column of status words; only rows of these words hold values",
+        help="a status column and its good words; other rows have no values",
     )
     export.add_argument(
-        "--sheet", metavar="NAME", help="sheet of a workbook, or group of TDMS or MDF (the one that has the columns)"
+        "--sheet", metavar="NAME", help="sheet of a workbook, or group of TDMS or MDF, where several have the columns"
     )
 
 
@@ -134,7 +134,7 @@ def read_any(path: Path, arguments: argparse.Namespace, stroke_m: float | None) 
     from positioner.cli.parts.progress import at_work
 
     take_mapping(arguments)
-    size = f", {path.stat().st_size / 1e6:.0f} MB" if path.is_file() and path.stat().st_size > LARGE else ""
+    size = f", {path.stat().st_size / 1e6:.0f} MB" if path.is_file() and path.stat().st_size > LARGE_FILE_BYTES else ""
     if size:
         print(f"reading {path}{size}", file=sys.stderr, flush=True)
     if arguments.column:

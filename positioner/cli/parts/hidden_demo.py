@@ -27,12 +27,12 @@ if TYPE_CHECKING:
 HIDDEN = {"name": "position_friction", "growth": 0.6, "travel_m": STROKE_M}
 CANDIDATES = ("position_friction", "spring_hardening", "asymmetric_friction", "preload")
 STEPS = (0.65, 0.50, 0.72, 0.45, 0.60, 0.35, 0.55, 0.40, 0.68, 0.52)
-PERIOD_S = 5e-3
-STEP_S, SETTLED_S = 0.8, 0.1
+HIDDEN_PERIOD_S = 5e-3
+STEP_S, HIDDEN_SETTLED_S = 0.8, 0.1
 """Time for each; its error is the mean over the last part of it."""
 IDENTIFIED_WITHIN_S = 120.0
-POLL_S = 0.01
-BETTER_BY = 3.0
+HIDDEN_POLL_S = 0.01
+BETTER_BY = 3.0  # times smaller error with the effect than without
 LARGEST_AFTER = 1e-3
 """Of the stroke, rms: what must be left at the most once the effect is known."""
 DAEMON = """[control]
@@ -81,7 +81,7 @@ def run_hidden(bus: str, folder: Path, told: Path | None) -> int:
     write_valve(
         folder / "hidden.toml", ValveFile.model_validate({"valve": bare.valve.model_dump(), "effect": [HIDDEN]})
     )
-    with slave_running(bus, folder, "hidden.toml", lockstep_s=PERIOD_S) as (setup, slave):
+    with slave_running(bus, folder, "hidden.toml", lockstep_s=HIDDEN_PERIOD_S) as (setup, slave):
         print(f"slave {slave}: the seed's valve, and an effect that the daemon is not told")
         before = _steps("before", folder, setup, slave)
         found = _extended(recording_in(folder / "before"), bare, folder / "better.toml")
@@ -121,21 +121,21 @@ def _steps(recordings: str, folder: Path, setup: BusSetup, slave: str, law: str 
         errors = []
         for reference in STEPS:
             dcs.set("reference", reference)
-            _wait(dcs, STEP_S - SETTLED_S)
-            errors.append(fmean(_wait(dcs, SETTLED_S)) - reference)
+            _wait(dcs, STEP_S - HIDDEN_SETTLED_S)
+            errors.append(fmean(_wait(dcs, HIDDEN_SETTLED_S)) - reference)
         if fault := int(dcs.get("fault")):
-            raise CommandFailed(f"the daemon has let go of the valve: {Fault(fault).text}; see {recordings}.log")
+            raise CommandFailed(f"the daemon has a fault: {Fault(fault).text}; see {recordings}.log")
     print(f"{len(STEPS)} steps, {recordings}: {100 * rms(errors):.3f} % of stroke rms")
     return errors
 
 
 def _wait(dcs: "Dcs", duration_s: float) -> list[float]:
     """Let time of the device pass; return positions seen meanwhile, of the stroke."""
-    end = dcs.get("cycles") + duration_s / PERIOD_S
+    end = dcs.get("cycles") + duration_s / HIDDEN_PERIOD_S
     positions: list[float] = []
     while not positions or dcs.get("cycles") < end:
         positions.append(dcs.get("position"))
-        time.sleep(POLL_S)
+        time.sleep(HIDDEN_POLL_S)
     return positions
 
 

@@ -10,7 +10,7 @@ if TYPE_CHECKING:
 
 def add_loop_arguments(parser: argparse.ArgumentParser) -> None:
     """Declare them."""
-    columns = parser.add_argument_group("columns", "named only where the file does not say by itself")
+    columns = parser.add_argument_group("columns", "needed only where the names in the file do not say it")
     for role, what in (
         ("time", "the time"),
         ("op", "the controller's output OP"),
@@ -25,10 +25,10 @@ def add_loop_arguments(parser: argparse.ArgumentParser) -> None:
         nargs=2,
         default=(0.0, 100.0),
         metavar=("AT0", "AT100"),
-        help="what the file has for 0 %% and 100 %% of OP (0 100)",
+        help="numbers of the file for 0 %% and 100 %% of OP (0 100)",
     )
-    columns.add_argument("--decimal", choices=(".", ","), help="the decimal sign (where the numbers leave it open)")
-    columns.add_argument("--time-format", metavar="FORMAT", help='how dates are written, "%%d.%%m.%%Y %%H:%%M:%%S"')
+    columns.add_argument("--decimal", choices=(".", ","), help="the decimal sign, where the file leaves it open")
+    columns.add_argument("--time-format", metavar="FORMAT", help='format of the dates, as "%%d.%%m.%%Y %%H:%%M:%%S"')
 
 
 def read_record(path: Path, arguments: argparse.Namespace) -> "LoopRecord":

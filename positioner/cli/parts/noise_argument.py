@@ -13,7 +13,7 @@ def add_noise_argument(parser: argparse.ArgumentParser) -> None:
         "--noise-m",
         type=float,
         metavar="M",
-        help="standard deviation of the position's noise, rounding included (else found where the stem rests)",
+        help="standard deviation of the position's noise, rounding included (measured where the stem rests)",
     )
 
 

@@ -8,5 +8,5 @@ def add_pressure_argument(parser: argparse.ArgumentParser) -> None:
     parser.add_argument(
         "--from-pressure",
         action="store_true",
-        help="drive the stem by the measured pressure_pa; what acts before it is neither tried nor fitted",
+        help="use the measured pressure_pa as input; effects before it are not tried",
     )

@@ -26,18 +26,23 @@ WINDOW_NEEDED = "experiment.travel_window: a {} goes over the whole travel, allo
 def add_test_arguments(parser: argparse.ArgumentParser, *, recordings: bool = True) -> None:
     """Declare the options of every test."""
     add_config(parser, text="the running daemon's file, with [recorder]")
-    parser.add_argument("--valve", dest="name", metavar="NAME", help="which of that file's valves")
+    parser.add_argument("--valve", dest="name", metavar="NAME", help="name of the valve, where the file has several")
     if recordings:
         parser.add_argument(
-            "--rec", type=Path, nargs="+", metavar="REC", help="recordings of such a test: nothing is moved"
+            "--rec", type=Path, nargs="+", metavar="REC", help="evaluate these recordings of such a test; nothing moves"
         )
-        parser.add_argument("--stroke-m", type=float, metavar="M", help="with --rec and without a file: the stroke")
-    parser.add_argument("--area-m2", type=float, metavar="M2", help="of the diaphragm: forces in newtons as well")
+        parser.add_argument(
+            "--stroke-m", type=float, metavar="M", help="stroke, where --rec is given without CONFIG.toml"
+        )
+    parser.add_argument("--area-m2", type=float, metavar="M2", help="area of the diaphragm; prints forces in N, too")
     parser.add_argument(
-        "--torque-nm-per-pa", type=float, metavar="NM_PER_PA", help="of a rotary valve's actuator: torques as well"
+        "--torque-nm-per-pa",
+        type=float,
+        metavar="NM_PER_PA",
+        help="torque per pressure of a rotary actuator; prints torques in N m, too",
     )
-    parser.add_argument("--keep", choices=KINDS, help="keep the outcome in the valve's history as this")
-    parser.add_argument("--against", choices=KINDS, help="compare with the newest that is kept as this")
+    parser.add_argument("--keep", choices=KINDS, help="keep the result under this name")
+    parser.add_argument("--against", choices=KINDS, help="compare with the newest result of this name")
     parser.add_argument("--json", type=Path, metavar="FILE", help="write verdict and figures as JSON")
     parser.add_argument("--picture", type=Path, metavar="FILE", help="draw it: .png, .svg or .pdf")
     parser.add_argument(
@@ -45,7 +50,7 @@ def add_test_arguments(parser: argparse.ArgumentParser, *, recordings: bool = Tr
         nargs=3,
         type=Path,
         metavar=("AUTHORITY.pem", "CERTIFICATE.pem", "KEY"),
-        help="connect with Modbus/TCP Security, as an engineer",
+        help="use Modbus/TCP Security, with a certificate of role engineer",
     )
 
 
@@ -169,7 +174,7 @@ def recordings_of(played: "list[Played]") -> "list[Recording]":
 
     for each in played:
         if each.problem or each.recording is None:
-            raise CommandFailed(f"broken off: {each.problem or each.state.text}; the law has the valve again")
+            raise CommandFailed(f"broken off: {each.problem or each.state.text}; the law commands the valve again")
     return [each.recording for each in played if each.recording is not None]
 
 
