@@ -53,7 +53,7 @@ BREAKAGES = (
     Breakage(
         "a node that another master stopped is a fault",
         "drivers/canopen/driver.py",
-        "self._watcher.was_interrupted |= self._sdo.hears_stopped()",
+        "self._watcher.was_interrupted |= self.sdo.hears_stopped()",
         "pass",
         "tests/drivers/test_canopen_faults.py::"
         "test_a_node_that_was_stopped_is_one_though_its_tpdo_was_missed_before_its_heartbeat_said_so",
