@@ -8,9 +8,13 @@ goes the other, s_b = s_c = -s_d, it therefore goes on, w = s_c, however late it
 does. In a closed loop the command follows the stem, but against it: it turns because the stem has gone on, w = s_c. So
 where nearly all such turns are made by the stem first, and by the same time, one of the two clocks is off. A move
 between two samples is n samples before a change between two: early by n - 1 to n + 1 periods.
+
+A slip goes the way that the command went since the slip before, however late it is. Where many go against that, what
+was commanded is not what drives the stem.
 """
 
 from dataclasses import dataclass
+from itertools import pairwise
 
 import numpy as np
 import numpy.typing as npt
@@ -26,8 +30,8 @@ NEARLY_ALL = 0.9
 """Share of the turns that the stem makes first, and of these of those that are early by the same time."""
 THE_SAME = 1
 """Samples by which they may differ from their median."""
-SAME_CLOCK = "Record both by one clock, or shift one of the columns by that, and diagnose again"
-"""What to do about it."""
+AGAINST, FEWEST_SLIPS = 0.2, 10
+"""Share of the slips that go against what the command did since the one before; slips that tell: of none it is half."""
 Rows = npt.NDArray[np.int64]
 
 
@@ -41,6 +45,11 @@ class Early:
     turns: int
 
     @property
+    def advice(self) -> str:
+        """Say what to do about it."""
+        return "Record both by one clock, or shift one of the columns by that, and diagnose again"
+
+    @property
     def sentence(self) -> str:
         """Say so."""
         by = f"{self.least_s:.3g} to {self.most_s:.3g} s" if self.least_s else f"up to {self.most_s:.3g} s"
@@ -48,6 +57,57 @@ class Early:
             f"the stem turns before its command in {self.early} of {self.turns} turns, by {by}: their two clocks "
             "differ by that, and by what the stem is late besides"
         )
+
+
+@dataclass(frozen=True, slots=True)
+class Unled:
+    """How many of the slips go against what the command did since the one before: it does not drive the stem."""
+
+    against: int
+    turns: int
+
+    @property
+    def sentence(self) -> str:
+        """Say so."""
+        return (
+            f"the stem goes against its command in {self.against} of {self.turns} slips: the command is not what drove "
+            "it, counts the other way, or has a clock of its own"
+        )
+
+    @property
+    def advice(self) -> str:
+        """Say what to do about it."""
+        return "Record what drives the stem beside it, by one clock, and diagnose again"
+
+
+Doubt = Early | Unled
+"""Why no verdict may rest on a recording."""
+
+
+def unled(command: Column, position_m: Column, scale_m: float, segments: tuple[tuple[int, int], ...]) -> Unled | None:
+    """Return how often the stem goes against its command, as late as suits it best; None where it hardly does.
+
+    It may be late by as much as slips lie apart. None, too, where too few slips tell.
+    """
+    rows, ways, begins = [], [], []
+    for first, end in segments:
+        found = slips(position_m[first:end], scale_m)
+        rows += [(first + before.last, first + slip.last) for before, slip in pairwise(found)]
+        ways += [each.direction for each in found[1:]]
+        begins += [first] * len(found[1:])
+    if len(rows) < FEWEST_SLIPS:
+        return None
+    ends, way, begin = np.array(rows), np.array(ways), np.array(begins)
+    latest = int(np.median(ends[:, 1] - ends[:, 0]))
+    if latest < 2 * HELD:  # a loop faster than its samples shows any order
+        return None
+    told = []
+    for late in range(latest + 1):
+        before, after = (command[np.maximum(ends[:, each] - late, begin)] for each in (0, 1))
+        went = np.sign(after - before)
+        told.append((float(np.mean(went == -way)), int(np.sum(went == -way))))
+    share, against = min(told)
+    return Unled(against, len(rows)) if share > AGAINST else None
 
 
 def early(

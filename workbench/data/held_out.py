@@ -17,7 +17,7 @@ import numpy.typing as npt
 from config.errors import InputError
 from config.recording import Column, Recording
 from config.results.result import Brief
-from workbench.data.clocks import Early
+from workbench.data.clocks import Doubt
 from workbench.data.record import Mask, Record, ready, require_few_samples
 from workbench.data.stretches import informative
 
@@ -83,7 +83,7 @@ class Split(Brief):
         return (self.test.record,) if of_one else (self.train.record, self.test.record)
 
     @property
-    def early(self) -> Early | None:
+    def early(self) -> Doubt | None:
         """How much the stem moves before its command, if it does: no verdict rests on such a recording."""
         known = [each.record.early for each in (self.train, self.test) if each.record.early]
         return max(known, key=lambda each: each.turns, default=None)

@@ -23,7 +23,7 @@ from config.results.result import Brief
 from config.valve_file import ValveParameters
 from signals.moves import AT_ONCE, rests_first, slips
 from signals.noise import frozen, held_back_m, quantum_m
-from workbench.data.clocks import Early, early
+from workbench.data.clocks import Doubt, early, unled
 from workbench.data.noise_floor import UNKNOWN, noise_std_m, not_repeating_m, repeatability_m, said_noise_m
 from workbench.data.pressure_lag import without_gaps_pa
 
@@ -85,8 +85,8 @@ class Record(Brief):
     """For each segment the row from which its command is known: what lies between was left out, being in motion."""
     pressure_known: Mask | None = None
     """Where the pressure was measured; elsewhere it is what the command makes of it (`pressure_lag`)."""
-    early: Early | None = None
-    """How much the stem moves before its command: their clocks differ, and no verdict may rest on it."""
+    early: Doubt | None = None
+    """How much the stem moves before its command, or against it: no verdict may rest on it."""
 
     @property
     def measured_pa(self) -> Column | None:
@@ -180,6 +180,7 @@ def ready(recording: Recording) -> Record:
     )
     at_rest = tuple(_from_rest(record, notes))
     before = early(time_s, command_pa, seen_m, record.scale_m, segments)
+    before = before or unled(command_pa, seen_m, record.scale_m, at_rest)
     if before:
         notes.append(before.sentence)
     begun, measured_pa = tuple(first for first, _ in segments), columns.get("pressure_pa")

@@ -19,7 +19,7 @@ untrusted     the searches disagree, and the best of them explains nothing
 from collections.abc import Sequence
 from typing import Literal
 
-from workbench.data.clocks import Early
+from workbench.data.clocks import Doubt
 from workbench.diagnosis.judged_landings import JudgedLandings
 from workbench.select.effect_candidates import EffectCandidate, EffectStep, EvaluatedModel
 
@@ -33,7 +33,7 @@ def verdict(
     motion_std_m: float,
     floor_m: float | None,
     landed: JudgedLandings | None = None,
-    early: Early | None = None,
+    early: Doubt | None = None,
 ) -> Verdict:
     """Return the verdict of a search that is through.
 

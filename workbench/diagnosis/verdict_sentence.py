@@ -5,7 +5,6 @@ from collections.abc import Mapping, Sequence
 from config.drive import Kind, Scale
 from sim.composition import BASE, COULOMB, STATIC
 from sim.effect import Effect
-from workbench.data.clocks import SAME_CLOCK
 from workbench.data.held_out import Split
 from workbench.data.noise_floor import UNKNOWN
 from workbench.diagnosis.as_given import AsGiven
@@ -174,7 +173,7 @@ def _unproved(
 
 def _not_known(best: EvaluatedModel, parts: Split) -> str:
     if parts.early:
-        return f"{parts.early.sentence}. {SAME_CLOCK}."
+        return f"{parts.early.sentence}. {parts.early.advice}."
     return f"{UNKNOWN}." if parts.floor_m is None else unknown_between_samples(best.fit, parts)
 
 

@@ -18,7 +18,6 @@ from config.recording import Recording
 from config.results.block import Block
 from config.results.result import Result
 from config.valve_file import ValveFile
-from workbench.data.clocks import SAME_CLOCK
 from workbench.data.held_out import Split, split
 from workbench.data.noise_floor import told
 from workbench.discover.added_force import Landing, landings
@@ -58,7 +57,7 @@ class Discovery(Result):
             case "explained":
                 return "nothing is left to explain: the valve as it is, refitted, is at the floor; no form is sought"
             case "unjudged" if self.split.early:
-                return f"{self.split.early.sentence}. {SAME_CLOCK}"
+                return f"{self.split.early.sentence}. {self.split.early.advice}"
             case "unjudged":
                 return "the noise is unknown, and with it whether anything is missing: say it, --noise-m M"
             case "none":

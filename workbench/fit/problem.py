@@ -15,6 +15,10 @@ from workbench.model.told_run import ToldMove, told_moves
 
 LEAST_MOVES = 3
 """Moves of the stem, of which three parameters of a balance of forces, and nothing more, may follow."""
+NO_REST = (
+    "the stem creeps or moves throughout, and is not seen to rest between moves: what holds it is not told from what "
+    "drives it; record steps that are held until it rests"
+)
 FREE = {Motion.DYNAMIC: DEFAULT, Motion.QUASI_STATIC: AT_REST, Motion.LANDINGS: LANDED}
 """What of the bare valve is fitted by default."""
 
@@ -105,14 +109,15 @@ def problem(
     """
     require_units(record, valve)
     told = told_moves(record)
-    _require_motion(record, told)
+    by = by or sampling(record, valve)
+    _require_motion(record, told, NO_LANDING if by.slow else NO_REST)
     load_n = max(WEIGHTS.break_away * valve.spring_n_per_m * record.scale_m, WEIGHTS.load * valve.coulomb_n)
-    return Problem(record, told, by or sampling(record, valve), from_pressure, load_n)
+    return Problem(record, told, by, from_pressure, load_n)
 
 
-def _require_motion(record: Record, told: Sequence[ToldMove]) -> None:
+def _require_motion(record: Record, told: Sequence[ToldMove], no_rest: str) -> None:
     if len(told) < LEAST_MOVES and 2 * sum(each.after - each.before for each in told) > len(record):
-        raise InputError("recording", NO_LANDING)
+        raise InputError("recording", no_rest)
     if len(told) < LEAST_MOVES:
         raise InputError(
             "recording", f"the stem moves {len(told)} times, at least {LEAST_MOVES} are needed to fit anything"

@@ -9,7 +9,6 @@ import numpy as np
 from config.recording import Recording
 from sim.effect import find_effect
 from workbench.compare.comparison import Comparison, compare
-from workbench.data.clocks import SAME_CLOCK
 from workbench.data.held_out import Split
 from workbench.diagnosis.diagnosis import Diagnosis
 from workbench.fit.fitted_parameter import Fitted
@@ -322,7 +321,7 @@ def _next(diagnosis: Diagnosis, commands: Sequence[str]) -> Html:
 def _to_be_judged(split: Split) -> str:
     """Say what would let a recording be judged."""
     if split.early:
-        return SAME_CLOCK[0].lower() + SAME_CLOCK[1:]
+        return split.early.advice[0].lower() + split.early.advice[1:]
     if split.floor_m is not None:
         return MORE_LANDINGS
     return "say the noise of the sensor, --noise-m, or record the stem at rest, the command held for 40 samples"
