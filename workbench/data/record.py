@@ -179,7 +179,7 @@ def ready(recording: Recording) -> Record:
         recording.kind.name,
     )
     at_rest = tuple(_from_rest(record, notes))
-    before = early(time_s, command_pa, seen_m, record.scale_m, segments)
+    before: Doubt | None = early(time_s, command_pa, seen_m, record.scale_m, segments)
     before = before or unled(command_pa, seen_m, record.scale_m, at_rest)
     if before:
         notes.append(before.sentence)
