@@ -26,7 +26,7 @@ def shifted(recording: Recording, samples: int) -> Recording:
 def test_a_command_whose_clock_is_late_is_seen_to(samples: int, least_s: float, most_s: float) -> None:
     """A stem that has moved a sample after a held command is seen a sample less before it."""
     found = ready(shifted(STEPS, samples)).early
-    assert found is not None
+    assert isinstance(found, Early)
     assert (found.least_s, found.most_s) == (least_s, most_s)
     assert found.early == found.turns > 10
     assert found.sentence in ready(shifted(STEPS, samples)).notes
