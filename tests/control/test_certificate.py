@@ -50,6 +50,7 @@ def test_no_valve_inside_the_intervals_violates_its_certificate() -> None:
 
 
 @pytest.mark.long
+@pytest.mark.timeout(3600)
 def test_none_of_ten_thousand_valves_violates_its_certificate() -> None:
     said = list(report(10_000, 8, 0))
     assert "violated certificates: 0 of 10000" in said
