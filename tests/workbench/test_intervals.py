@@ -13,7 +13,7 @@ from workbench.data.record import ready
 from workbench.fit.likelihood import Groups, Likelihood, soft
 from workbench.fit.minimiser import End
 from workbench.fit.problem import problem
-from workbench.fit.uncertainty import _clusters, uncertainty
+from workbench.fit.uncertainty import uncertainty
 
 DRAWS = 100
 TELL = 6
@@ -58,10 +58,7 @@ def like() -> Likelihood:
 @pytest.mark.parametrize("scatter", few_always([3.0, 0.0]))
 def test_the_truth_lies_inside_in_nineteen_of_twenty(like: Likelihood, scatter: float) -> None:
     generator = np.random.default_rng(1)
-    move_of = np.full(like.count, -1)
-    for k, rows in enumerate(_clusters(like)):
-        move_of[rows] = k
-    moves = move_of.max() + 1
+    move_of, moves = like.move_of, len(like.moves)
     straight = Straight(like, np.where(move_of % TELL == 0, 10.0, 0.1))
     held = 0
     for _ in range(DRAWS):

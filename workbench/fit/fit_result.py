@@ -183,9 +183,9 @@ class Fit(Result):
 
 
 def fit_at(problem: Problem, like: Likelihood, end: End, agreement: int) -> Fit:
-    """Return the fit of where searches have ended, from so many starts."""
-    determined = uncertainty(like, end)
-    end, record = _as_runs_freely(like, end, determined), problem.record
+    """Return the fit of where searches have ended, from so many starts; of a coarse one none agrees with another."""
+    determined, record = uncertainty(like, end), problem.record
+    end = _as_runs_freely(like, end, determined) if agreement else end
     theta = like.theta(end.z)
     error_m = like.off_m(like.path(theta, end.onsets_s), theta)
     return Fit(
@@ -225,17 +225,14 @@ def _as_runs_freely(like: Likelihood, end: End, determined: Uncertainty) -> End:
         z[i] = value
         return z
 
-    trials = [end.z, *(each for each in map(placed, open_) if _as_likely(like, end, each))]
+    def cost(z: Vector) -> float:
+        return like.cost(like.at(like.theta(z), end.onsets_s).whole)
+
+    trials = [end.z, *(each for each in map(placed, open_) if cost(each) <= end.cost + RISE_95)]
     errors = [np.nanmean((run.position_m(like.theta(z)) - seen_m) ** 2) for z in trials]
     best = trials[int(np.nanargmin(errors))] if np.isfinite(errors).any() else end.z
     groups = like.at(like.theta(best), end.onsets_s)
     return replace(end, z=best, groups=groups, cost=like.cost(groups.whole))
-
-
-def _as_likely(like: Likelihood, end: End, z: Vector) -> bool:
-    """Whether break-aways leave other coordinates as open as those of an end."""
-    groups = like.at(like.theta(z), end.onsets_s)
-    return like.cost(groups.whole) <= end.cost + RISE_95
 
 
 def terms(like: Likelihood, groups: Groups, rest_of: Rows | None = None, moved: Vector | None = None) -> Terms:

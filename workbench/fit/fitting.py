@@ -20,7 +20,7 @@ from workbench.data.record import Record, ready, require_few_samples
 from workbench.data.stretches import informative
 from workbench.fit.fit_result import Fit, Terms, fit_at, terms
 from workbench.fit.likelihood import Likelihood
-from workbench.fit.minimiser import End, begun, derivatives, ended
+from workbench.fit.minimiser import COARSE, GLIMPSE, WHOLE, Effort, End, begun, derivatives, ended
 from workbench.fit.onsets import with_onsets
 from workbench.fit.problem import Problem, problem
 from workbench.fit.starts import (
@@ -47,6 +47,8 @@ COARSE_ROUNDS = 2
 """Of parabolas for onsets from which a coarse search begins: it moves them itself."""
 SAME_COST = 1.01
 """Factor on the cost, and `NATS` besides, within which two searches have come to the same."""
+SETTLED_IN = 5
+"""Rounds of onsets and coordinates at most: two take nearly all."""
 NATS = 1.0
 """Cost within which two ends are one."""
 
@@ -156,12 +158,12 @@ def effect_fit(
     Raises:
         InputError: an unknown effect, one that is there, or one that the record cannot show.
     """
-    return finished(of, begun_trial(of, valve, effects, base, free=free, workers=workers, points=points))
+    return finished(of, advanced(glimpsed(of, valve, effects, base, free=free, workers=workers, points=points)))
 
 
 @dataclass(frozen=True, slots=True)
 class Trial:
-    """A valve with effects added, searched coarsely: enough to tell whether it is worth going on."""
+    """A valve with effects added, searched for a while: enough to tell whether it is worth going on."""
 
     like: Likelihood
     valleys: tuple[End, ...]
@@ -179,7 +181,7 @@ class Trial:
 
 
 @linear_algebra_alone()
-def begun_trial(
+def glimpsed(
     of: Problem,
     valve: ValveFile,
     effects: Sequence[str],
@@ -189,7 +191,7 @@ def begun_trial(
     workers: int | None = 1,
     points: Sequence[tuple[float, ...]] = (),
 ) -> Trial:
-    """Search coarsely for a valve with effects added; arguments and errors as of `effect_fit`."""
+    """Look for a valve with effects added from every start; arguments and errors as of `effect_fit`."""
     composition = extended(base.valve, effects, valve.valve)
     added_effects = composition.effects[len(base.valve.effect) :]
     of.require_shown(added_effects)
@@ -201,41 +203,50 @@ def begun_trial(
     for i, name in enumerate(BASE):
         sheet[i] = getattr(valve.valve, name)
     off = like.coordinates(fitted.theta)
-    searches: list[Callable[[], End]] = [lambda: ended(like, off, base.onsets_s, coarsely=True)]
+    searches: list[Callable[[], End]] = [lambda: ended(like, off, base.onsets_s, GLIMPSE)]
     if like.run.hidden:  # friction stands in for a play where slides land: landings do not choose its width
         begins = strewn_starts(like, added, fitted, points)
-        searches += [lambda z=z: _from_afar(like, z, coarsely=True) for z in begins]  # type: ignore[misc]
+        searches += [lambda z=z: _from_afar(like, z, GLIMPSE) for z in begins]  # type: ignore[misc]
     else:
         near = near_start(like, added, fitted, points)
-        searches.append(lambda: ended(like, near, base.onsets_s, coarsely=True))
+        searches.append(lambda: ended(like, near, base.onsets_s, GLIMPSE))
         if not at_the_noise(base.cost, base.count):
             chosen = partial(with_strengths, like, added, points=points)
             begins = starts_by_landings(like, added, fitted, Origin(sheet), points)
-            searches += [lambda z=z: _from_afar(like, z, chosen, coarsely=True) for z in begins]  # type: ignore[misc]
+            searches += [lambda z=z: _from_afar(like, z, GLIMPSE, chosen) for z in begins]  # type: ignore[misc]
     ends = list(on_threads(lambda search: search(), searches, workers))
     best = min(ends, key=lambda each: each.cost)
     other_order = in_other_order(like, best.z)
     if other_order is not None and not at_the_noise(best.cost, like.count):
         onsets_s, _ = with_onsets(like, like.theta(other_order), COARSE_ROUNDS)
-        ends.append(ended(like, other_order, onsets_s, coarsely=True))
+        ends.append(ended(like, other_order, onsets_s, GLIMPSE))
     return Trial(like, tuple(sorted(ends, key=lambda each: each.cost)))
 
 
 @linear_algebra_alone()
-def finished(of: Problem, trial: Trial) -> Fit:
-    """Search to the end from the best valley of a trial, and from the next best if that leaves something."""
+def advanced(trial: Trial) -> Trial:
+    """Search on in the best valley of a trial, and in the next best if that leaves something."""
     like, (first, *others) = trial.like, trial.valleys
-    ends = [_settled(like, ended(like, first.z, first.onsets_s))]
+    ends = [ended(like, first.z, first.onsets_s, COARSE)]
     if not at_the_noise(ends[0].cost, like.count) and others and others[0].cost < NEAR * first.cost:
-        ends.append(_settled(like, ended(like, others[0].z, others[0].onsets_s)))
-    return _best(of, like, ends)
+        ends.append(ended(like, others[0].z, others[0].onsets_s, COARSE))
+    return Trial(like, tuple(sorted((*ends, *others[len(ends) - 1 :]), key=lambda each: each.cost)))
+
+
+@linear_algebra_alone()
+def finished(of: Problem, trial: Trial) -> Fit:
+    """Search to the end from the best valley of a trial, and from the next if it is nearly as good."""
+    like, (first, *others) = trial.like, trial.valleys
+    near = [first, *(each for each in others[:1] if each.cost < NEAR * first.cost)]
+    return _best(of, like, [_settled(like, ended(like, each.z, each.onsets_s)) for each in near])
 
 
 @linear_algebra_alone()
 def left_off(of: Problem, trial: Trial) -> Fit:
     """Return the fit of a trial that is not gone on with, as far as it came."""
     best = trial.valleys[0]
-    return _best(of, trial.like, [replace(best, jacobian=derivatives(trial.like, best.z, best.onsets_s))])
+    jacobian = derivatives(trial.like, best.z, best.onsets_s)
+    return fit_at(of, trial.like, replace(best, jacobian=jacobian), agreement=0)
 
 
 def problem_of(found: Fit, record: Record) -> Problem:
@@ -282,23 +293,27 @@ def _scale(base: Fit, known: ValveParameters) -> ValveParameters:
 
 
 def _from_afar(
-    like: Likelihood, z: Vector, chosen: Callable[[Vector], Vector] | None = None, *, coarsely: bool = False
+    like: Likelihood,
+    z: Vector,
+    effort: Effort = WHOLE,
+    chosen: Callable[[Vector], Vector] = lambda landed: landed,
 ) -> End:
     """Search from a place of which nothing is known: landings first, then what acts in time, onsets, and all."""
-    landed = begun(like, z)
-    if chosen:
-        landed = chosen(landed)
-    onsets_s, _ = with_onsets(like, like.theta(landed), rounds=COARSE_ROUNDS if coarsely else None)
-    return ended(like, landed, onsets_s, coarsely=coarsely)
+    landed = chosen(begun(like, z))
+    rounds = None if effort == WHOLE else COARSE_ROUNDS
+    onsets_s, _ = with_onsets(like, like.theta(landed), rounds)
+    return ended(like, landed, onsets_s, effort)
 
 
 def _settled(like: Likelihood, end: End) -> End:
-    """Search on where other onsets suit the valve better than those that a search came to."""
-    onsets_s, groups = with_onsets(like, like.theta(end.z))
-    if like.cost(groups.whole) > end.cost - NATS:
-        return end
-    there = ended(like, end.z, onsets_s)
-    return there if there.cost < end.cost else end
+    """Search on where other onsets suit the valve better than those that a search came to, as long as it pays."""
+    for _ in range(SETTLED_IN):
+        onsets_s, groups = with_onsets(like, like.theta(end.z))
+        if like.cost(groups.whole) > end.cost - NATS:
+            break
+        there = ended(like, end.z, onsets_s)
+        end = min(end, there, key=lambda each: each.cost)
+    return end
 
 
 def at_the_noise(cost: float, count: int) -> bool:

@@ -134,6 +134,15 @@ def last_in_motion(move: ToldMove, weights: Weights = WEIGHTS) -> int:
     return min(move.after + weights.beside, move.until) - 1
 
 
+def motion_rows(like: "Likelihood") -> list[tuple[int, int]]:
+    """Return which of the residuals in motion belong to each move, first to end (half open)."""
+    moving = like.layout.moving
+    return [
+        (int(np.searchsorted(moving, first_in_motion(each))), int(np.searchsorted(moving, last_in_motion(each) + 1)))
+        for each in like.moves
+    ]
+
+
 class Likelihood:
     """The residuals of a composition told through a record; its parameters by their coordinates z, onsets in s.
 
@@ -162,6 +171,18 @@ class Likelihood:
         self._last: tuple[bytes, Groups] | None = None
         self._quantum = next((i for i, each in enumerate(_guesses(composition)) if each == "quantum"), None)
         self.broken = np.array([k for k, each in enumerate(told) if not each.begins_in_motion], dtype=np.int64)
+        self.move_of = self._move_of()
+        """The move whose onset each residual hangs on, (rows,); the number of moves: none."""
+
+    def _move_of(self) -> Rows:
+        none, rows = len(self.moves), self.layout
+        moving = np.full(rows.moving.size, none, dtype=np.int64)
+        for k, (first, end) in enumerate(motion_rows(self)):
+            moving[first:end] = k
+        resting = np.full(rows.per_rest.size, none, dtype=np.int64)
+        judged = rows.rest_after >= 0
+        resting[rows.rest_after[judged]] = np.flatnonzero(judged)
+        return np.concatenate([moving, resting, resting[rows.rest_of], self.broken])
 
     @property
     def moves(self) -> tuple[ToldMove, ...]:

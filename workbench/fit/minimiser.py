@@ -1,8 +1,17 @@
-"""The minimiser of the likelihood: scipy's trust region on the soft-L1 cost, from one place to the end it leads to.
+"""The minimiser of the likelihood: damped Gauss-Newton steps on the soft-L1 cost, from a place to the end they lead to.
 
-    variables        coordinates z of the parameters, and of each move its onset, in periods from where it shows
-    derivatives      forward differences: one simulation a parameter, and one, with all onsets shifted, for all onsets:
-                     each acts until the next
+    r(z, o)                    residuals; z coordinates of the parameters, o of each move its onset, in periods from
+                               where it shows
+    W = 1 / sqrt(1 + (r / s)^2),   H = J' W J,   g = J' W r
+    (H + lambda diag H) (dz, do) = -g                            Levenberg and Marquardt, on reweighted squares
+
+A residual hangs on the onset of one move alone. H is [A, C; C', D] with D diagonal, and the onsets are eliminated:
+
+    (A - C D^-1 C') dz = -(g_z - C D^-1 g_o),   do = -D^-1 (g_o + C' dz)
+
+J is taken by forward differences, one simulation a parameter and one for all onsets, and kept up by what each step
+shows (Broyden), move by move:  J <- J + (dr - J dv) dv' / |dv|^2, v = (z, o), lengths by the curvature. It is taken
+anew where a step falls short of what it promised, and before an end is believed.
 
 `begun` lets the landings lead first, with the data sheet as a weak prior: where slides end hangs on forces alone, so
 that a start far off finds its valley there.
@@ -10,15 +19,24 @@ that a start far off finds its valley there.
 
 from collections.abc import Callable
 from dataclasses import dataclass
+from typing import NamedTuple
 
 import numpy as np
-from scipy.optimize import least_squares
 
 from sim.composition import COULOMB, SPRING, STATIC, VISCOUS
 from sim.karnopp import Vector
 from workbench.fit.breaking_off import go_on
-from workbench.fit.likelihood import Groups, Likelihood
-from workbench.fit.onsets import by_onsets
+from workbench.fit.likelihood import Groups, Likelihood, Rows, soft
+from workbench.fit.onsets import SHIFT
+
+
+class Effort(NamedTuple):
+    """How long is searched."""
+
+    simulations: int
+    """At most."""
+    enough: float
+    """Relative fall of the cost in a step that ends the search."""
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -31,24 +49,177 @@ class Search:
     """Of a coordinate, for its derivatives: a simulation is smooth to a hundredth of that."""
     begin: float = 3.0
     """Weight of landings at the beginning, in their deviations: wide, lest one of them decides the valley."""
-    begin_steps: int = 25
-    """Evaluations of the derivatives at the beginning."""
-    begin_enough: float = 1e-3
-    """Relative fall of the cost in a step that ends the beginning."""
-    steps: int = 40
-    """The same, of all: an end that takes more is not to be had."""
-    enough: float = 1e-4
-    """Relative fall of the cost in a step that ends the search: a tenth of a nat of a thousand residuals."""
-    coarse_steps: int = 8
-    """Evaluations of the derivatives of a search that only tells whether it is worth going on."""
-    coarse: float = 1e-2
-    """Relative fall of the cost in a step that ends it."""
 
 
-Rows = Callable[[Vector], Vector]
-SEARCH = Search()
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Damping:
+    """How lambda follows the steps, as usual (Nocedal and Wright, Numerical Optimization, 4.1 and 10.3)."""
+
+    first: float = 1e-3
+    least: float = 1e-4
+    most: float = 100.0
+    """Where no step so short leads lower, none does: what is left is the arithmetic's."""
+    good: float = 0.75
+    """Share of what a step promised, from which on lambda falls."""
+    poor: float = 0.25
+    """The same, below which it grows, and J is taken anew."""
+    down: float = 0.2
+    up: float = 2.0
+    failed: float = 10.0
+    """Factors on lambda: after a good step, a poor one, and one that led higher."""
+    free: float = 0.1
+    """Lambda up to which a small step is small by itself and not by lambda."""
+    longest: float = 0.3
+    """Of a coordinate, a logarithm mostly, in a step without damping: one that hardly matters is not thrown about."""
+    part: float = 0.8
+    """Of the way to a bound that one step takes at most: a coordinate that a first step throws there is lost."""
+
+
+SEARCH, DAMPING = Search(), Damping()
 PRIOR = {SPRING: 0.15, COULOMB: 0.4, VISCOUS: 0.7, STATIC: 0.1}
 """Standard deviations of logarithms by which a valve may be off its data sheet; of F_s / F_c."""
+TO_BEGIN = Effort(40, 1e-2)
+"""By landings alone: three times as long ends in the same valleys."""
+GLIMPSE = Effort(20, 1e-2)
+"""Derivatives and a dozen steps: of 19 records with one effect it is then among the first three (`few_slips`)."""
+COARSE = Effort(60, 1e-2)
+"""To tell a valley from another."""
+WHOLE = Effort(400, 1e-4)
+"""To its end, a tenth of a nat of a thousand residuals: one that takes more is not to be had."""
+NO_SLOPE = 1e-12
+"""Curvature of a cost by an onset that it does not hang on."""
+
+
+class Slopes(NamedTuple):
+    """The derivatives of residuals."""
+
+    by_z: Vector
+    """(rows, parameters)."""
+    by_onset: Vector
+    """By the onset, in periods, of the move that each belongs to, (rows,)."""
+
+
+class Place(NamedTuple):
+    """Coordinates, (parameters,), and onsets, in periods from where they show, (moves,)."""
+
+    z: Vector
+    o: Vector
+
+
+@dataclass(frozen=True, slots=True)
+class Ground:
+    """What is to be lowered, and between which places."""
+
+    rows: Callable[[Place], Vector]
+    of: Rows
+    """The move that each residual belongs to, (rows,); the number of moves: none."""
+    low: Place
+    high: Place
+    soft: float
+
+    def cost(self, r: Vector) -> float:
+        """Return the soft-L1 cost of residuals."""
+        return float(soft(r, self.soft).sum())
+
+    def of_moves(self, values: Vector) -> Vector:
+        """Return sums over the residuals of each move, (moves,)."""
+        return np.asarray(np.bincount(self.of, values, self.low.o.size + 1)[:-1], dtype=np.float64)
+
+    def to_rows(self, values: Vector) -> Vector:
+        """Return of each residual its move's value, (rows,); 0 of none."""
+        return np.asarray(np.append(values, 0.0)[self.of])
+
+    def slopes(self, at: Place, r: Vector) -> Slopes:
+        """Return the derivatives of residuals r, by forward differences, backward at an upper end."""
+        by_z = np.empty((r.size, at.z.size))
+        for i in range(at.z.size):
+            step = SEARCH.step if at.z[i] + SEARCH.step <= self.high.z[i] else -SEARCH.step
+            there = at.z.copy()
+            there[i] += step
+            by_z[:, i] = (self.rows(Place(there, at.o)) - r) / step
+        if not at.o.size:
+            return Slopes(by_z, np.zeros(r.size))
+        shifted = (self.rows(Place(at.z, at.o + SHIFT)) - r) / SHIFT
+        return Slopes(by_z, np.where(self.of < at.o.size, shifted, 0.0))
+
+
+def lowest(ground: Ground, begin: Place, effort: Effort) -> Place:
+    """Return the place to which damped steps lead with so much effort."""
+    left, enough, rows = effort.simulations, effort.enough, ground.rows
+
+    def simulated(place: Place) -> Vector:
+        nonlocal left
+        left -= 1
+        return rows(place)
+
+    here = Place(*(np.clip(at, low, high) for at, low, high in zip(begin, ground.low, ground.high, strict=True)))
+    ground = Ground(simulated, ground.of, ground.low, ground.high, ground.soft)
+    r = ground.rows(here)
+    cost, slopes, fresh, damping, idle = ground.cost(r), ground.slopes(here, r), True, DAMPING.first, False
+    while left > 0 and damping <= DAMPING.most:
+        step, lengths = _step(ground, here, r, slopes, damping)
+        linear = r + slopes.by_z @ step.z + slopes.by_onset * ground.to_rows(step.o)
+        promised, free = cost - ground.cost(linear), damping <= DAMPING.free
+        if promised <= 0.5 * enough * cost * (1.0 if free else DAMPING.free):
+            if fresh:
+                break
+            slopes, fresh = ground.slopes(here, r), True
+            continue
+        there = Place(here.z + step.z, here.o + step.o)
+        r_there = ground.rows(there)
+        gained = cost - ground.cost(r_there)
+        kept, small = gained > DAMPING.poor * promised, gained < enough * cost
+        if gained <= 0.0:
+            damping *= DAMPING.failed
+            if not fresh:
+                slopes, fresh = ground.slopes(here, r), True
+            continue
+        slopes = _seen(ground, slopes, r_there - linear, step, lengths)
+        here, r, cost = there, r_there, cost - gained
+        if fresh and small and (idle or (free and kept)):
+            break
+        good = gained > DAMPING.good * promised
+        damping = max(damping * (DAMPING.down if good else 1.0 if kept else DAMPING.up), DAMPING.least)
+        idle, fresh = small, small or not kept
+        if fresh:
+            slopes = ground.slopes(here, r)
+    return here
+
+
+def _step(ground: Ground, here: Place, r: Vector, slopes: Slopes, damping: float) -> tuple[Place, Place]:
+    """Return the damped step inside the bounds, and the square root of the curvature by each variable."""
+    J, j = slopes
+    weight = 1.0 / np.sqrt(1.0 + (r / ground.soft) ** 2)
+    A, g_z = J.T @ (weight[:, None] * J), J.T @ (weight * r)
+    D, g_o = ground.of_moves(weight * j**2), ground.of_moves(weight * r * j)
+    C = np.array([ground.of_moves(weight * j * column) for column in J.T]).reshape(here.z.size, here.o.size)
+    diagonal = np.diag(A).copy()
+    stays = ((here.o <= ground.low.o) & (g_o > 0.0)) | ((here.o >= ground.high.o) & (g_o < 0.0)) | (D <= NO_SLOPE)
+    usual = D.mean() if D.size else 0.0  # an onset that its move hardly hangs on is not thrown about for it
+    damped = np.where(stays, np.inf, D + damping * np.maximum(D, usual) + NO_SLOPE)
+    S = A + np.diag((damping + NO_SLOPE) * diagonal) - (C / damped) @ C.T
+    wanted = (C / damped) @ g_o - g_z
+    free = ~(((here.z <= ground.low.z) & (g_z > 0.0)) | ((here.z >= ground.high.z) & (g_z < 0.0)) | (diagonal <= 0.0))
+    longest = DAMPING.longest / (1.0 + 10.0 * damping)
+    low = np.maximum(DAMPING.part * (ground.low.z - here.z), -longest)
+    high = np.minimum(DAMPING.part * (ground.high.z - here.z), longest)
+    z = np.zeros(here.z.size)
+    while free.any():
+        z[free] = np.linalg.lstsq(S[np.ix_(free, free)], wanted[free] - S[np.ix_(free, ~free)] @ z[~free])[0]
+        out = free & ((z < low) | (z > high))
+        z[out] = np.clip(z, low, high)[out]
+        if not out.any():
+            break
+        free &= ~out
+    o = np.clip(here.o - (g_o + z @ C) / damped, ground.low.o, ground.high.o) - here.o
+    return Place(z, o), Place(np.sqrt(diagonal), np.sqrt(np.maximum(D, NO_SLOPE)))
+
+
+def _seen(ground: Ground, slopes: Slopes, miss: Vector, step: Place, lengths: Place) -> Slopes:
+    """Return derivatives by which a step would have missed nothing."""
+    z, o = lengths.z * step.z, lengths.o * step.o
+    part = miss / np.maximum(z @ z + ground.to_rows(o**2), np.finfo(float).tiny)
+    return Slopes(slopes.by_z + part[:, None] * (lengths.z * z), slopes.by_onset + part * ground.to_rows(lengths.o * o))
 
 
 @dataclass(frozen=True, slots=True)
@@ -67,92 +238,74 @@ def begun(like: Likelihood, z: Vector) -> Vector:
     """Return the coordinates to which landings and break-aways lead, (parameters,)."""
     onsets_s = like.run.first_onsets_s()
     prior = np.array([PRIOR.get(each.index, np.inf) for each in like.parameters])
-    lower, upper = _bounds(like)
-    start = np.clip(z, lower, upper)
+    low, high = _bounds(like)
+    start, none = np.clip(z, low, high), np.empty(0)
 
-    def rows(z: Vector) -> Vector:
+    def rows(at: Place) -> Vector:
         go_on()
-        found = like.at(like.theta(z), onsets_s)
+        found = like.at(like.theta(at.z), onsets_s)
         landed = found.landings * like.landing_m / (SEARCH.begin * like.sigma_m)
-        return np.concatenate([landed, found.break_aways, (z - start) / prior])
+        return np.concatenate([landed, found.break_aways, (at.z - start) / prior])
 
-    def by_z(z: Vector) -> Vector:
-        return _differences(rows, z, upper)
-
-    found = least_squares(
-        rows, start, by_z, bounds=(lower, upper), loss="soft_l1", f_scale=like.weights.soft, x_scale="jac",
-        max_nfev=SEARCH.begin_steps, ftol=SEARCH.begin_enough, xtol=1e-6,
-    )  # fmt: skip
-    return np.asarray(found.x)
+    of = np.zeros(like.layout.per_rest.size + like.broken.size + start.size, dtype=np.int64)
+    ground = Ground(rows, of, Place(low, none), Place(high, none), like.weights.soft)
+    return lowest(ground, Place(start, none), TO_BEGIN).z
 
 
 def ended(
     like: Likelihood,
     z: Vector,
     onsets_s: Vector | None = None,
+    effort: Effort = WHOLE,
     *,
-    coarsely: bool = False,
     held: tuple[Vector, Vector] | None = None,
 ) -> End:
-    """Return where a search from these coordinates, (parameters,), and onsets, s, (moves,), stays.
+    """Return where a search from these coordinates, (parameters,), and onsets, s, (moves,), stays, or is so far.
 
-    Coarsely: where it is after some steps, by which its valley is known. Held: to coordinates, by a matrix that times
-    what they are off these is normal.
+    Held: to coordinates, by a matrix that times what they are off these is normal.
     """
-    first_s, period_s, count = like.run.first_onsets_s(), like.record.period_s, len(like.parameters)
-    earliest_s, latest_s = like.run.bounds_s(SEARCH.reach)
-    lower, upper = _bounds(like)
-    low = np.concatenate([lower, (earliest_s - first_s) / period_s])
-    high = np.concatenate([upper, (latest_s - first_s) / period_s])
-    begin_s = first_s if onsets_s is None else onsets_s
-    start = np.clip(np.concatenate([z, (begin_s - first_s) / period_s]), low, high)
-    start = low + np.clip(start - low, 1e-6 * (high - low), (1.0 - 1e-6) * (high - low))
-
-    def parted(v: Vector) -> tuple[Vector, Vector]:
-        return v[:count], first_s + period_s * v[count:]
-
-    def rows(v: Vector) -> Vector:
-        go_on()
-        z, onsets_s = parted(v)
-        whole = like.at(like.theta(z), onsets_s).whole
-        return whole if held is None else np.concatenate([whole, held[1] @ (z - held[0])])
-
-    def slopes(v: Vector) -> Vector:
-        found = derivatives(like, *parted(v))
-        if held is None:
-            return found
-        return np.vstack([found, np.hstack([held[1], np.zeros((count, v.size - count))])])
-
-    found = least_squares(
-        rows, start, slopes, bounds=(low, high), loss="soft_l1", f_scale=like.weights.soft, x_scale="jac",
-        max_nfev=SEARCH.coarse_steps if coarsely else SEARCH.steps,
-        ftol=SEARCH.coarse if coarsely else SEARCH.enough, xtol=1e-9, gtol=1e-9,
-    )  # fmt: skip
-    z, onsets_s = parted(np.asarray(found.x))
-    groups = like.at(like.theta(z), onsets_s)
-    jacobian = np.empty((0, 0)) if coarsely else derivatives(like, z, onsets_s)
-    return End(z, onsets_s, like.cost(groups.whole), groups, jacobian)
+    ground = _ground(like, held)
+    begin_s = like.run.first_onsets_s() if onsets_s is None else onsets_s
+    found = lowest(ground, Place(z, _periods(like, begin_s)), effort)
+    onsets_s = _seconds(like, found.o)
+    groups = like.at(like.theta(found.z), onsets_s)
+    jacobian = derivatives(like, found.z, onsets_s) if effort == WHOLE else np.empty((0, 0))
+    return End(found.z, onsets_s, like.cost(groups.whole), groups, jacobian)
 
 
 def derivatives(like: Likelihood, z: Vector, onsets_s: Vector) -> Vector:
     """Return the derivatives of the residuals by coordinates and onsets, in periods, (rows, parameters + moves)."""
-    _, upper = _bounds(like)
-    by_z = _differences(lambda there: like.at(like.theta(there), onsets_s).whole, z, upper)
-    return np.hstack([by_z, by_onsets(like, like.theta(z), onsets_s)])
+    ground, at = _ground(like), Place(z, _periods(like, onsets_s))
+    by_z, by_onset = ground.slopes(at, ground.rows(at))
+    of_move = np.zeros((by_onset.size, onsets_s.size + 1))
+    of_move[np.arange(by_onset.size), like.move_of] = by_onset
+    return np.hstack([by_z, of_move[:, :-1]])
+
+
+def _ground(like: Likelihood, held: tuple[Vector, Vector] | None = None) -> Ground:
+    """Return the ground of a likelihood, its coordinates held as of `ended`."""
+    low, high = _bounds(like)
+    earliest_s, latest_s = like.run.bounds_s(SEARCH.reach)
+
+    def rows(at: Place) -> Vector:
+        go_on()
+        whole = like.at(like.theta(at.z), _seconds(like, at.o)).whole
+        return whole if held is None else np.concatenate([whole, held[1] @ (at.z - held[0])])
+
+    of = like.move_of if held is None else np.append(like.move_of, np.full(low.size, len(like.moves)))
+    return Ground(
+        rows, of, Place(low, _periods(like, earliest_s)), Place(high, _periods(like, latest_s)), like.weights.soft
+    )
+
+
+def _periods(like: Likelihood, onsets_s: Vector) -> Vector:
+    return np.asarray((onsets_s - like.run.first_onsets_s()) / like.record.period_s)
+
+
+def _seconds(like: Likelihood, o: Vector) -> Vector:
+    return np.asarray(like.run.first_onsets_s() + like.record.period_s * o)
 
 
 def _bounds(like: Likelihood) -> tuple[Vector, Vector]:
     ends = np.array([each.bounds for each in like.parameters]).reshape(-1, 2)
     return ends[:, 0], ends[:, 1]
-
-
-def _differences(rows: Rows, z: Vector, upper: Vector) -> Vector:
-    """Return the derivatives of rows by coordinates, by forward differences, backward at the upper end."""
-    here = rows(z)
-    columns = []
-    for i in range(z.size):
-        step = SEARCH.step if z[i] + SEARCH.step <= upper[i] else -SEARCH.step
-        there = z.copy()
-        there[i] += step
-        columns.append((rows(there) - here) / step)
-    return np.array(columns).T.reshape(here.size, z.size)

@@ -22,9 +22,8 @@ from scipy.special import stdtrit
 
 from sim.composition import STATIC
 from sim.karnopp import Vector
-from workbench.fit.likelihood import Likelihood, Rows
+from workbench.fit.likelihood import Likelihood
 from workbench.fit.minimiser import End
-from workbench.fit.onsets import motion_rows
 
 PROBABILITY = 0.975
 FEWEST_FREE = 2.0
@@ -88,7 +87,9 @@ def uncertainty(like: Likelihood, end: End) -> Uncertainty:
     values, vectors = np.linalg.eigh(H)
     known = values > NOTHING * values[-1]
     inverse = (vectors[:, known] / values[known]) @ vectors[:, known].T
-    scores = np.array([scaled[rows].T @ (weight[rows] * r[rows]) for rows in _clusters(like)])
+    scores = np.zeros((len(like.moves) + 1, scaled.shape[1]))  # the last: what belongs to no move
+    np.add.at(scores, like.move_of, (weight * r)[:, None] * scaled)
+    scores = scores[:-1]
     free = max(float(len(scores)) - count, FEWEST_FREE)
     sandwich = inverse @ (scores.T @ scores * (len(scores) / free)) @ inverse
     variance = np.maximum(np.diag(inverse), np.diag(sandwich)) / scale**2
@@ -117,22 +118,6 @@ def _root(covariance: Vector, std: Vector) -> Vector:
     np.fill_diagonal(hangs, 1.0)
     values, vectors = np.linalg.eigh(hangs)
     return np.asarray((vectors / np.sqrt(np.maximum(values, NOTHING))).T / np.maximum(std, NOTHING))
-
-
-def _clusters(like: Likelihood) -> list[Rows]:
-    """Return the rows of the residuals that belong to each move and the rest it ends in; the first rest by itself."""
-    sizes = np.cumsum([0, like.layout.moving.size, like.layout.per_rest.size, like.layout.starts.size])
-    broken = {int(k): i for i, k in enumerate(like.broken)}
-    found = []
-    for k, (first, end) in enumerate(motion_rows(like)):
-        rest = like.layout.rest_after[k]
-        rows = [np.arange(first, end)]
-        if rest >= 0:
-            rows += [np.array([sizes[1] + rest]), sizes[2] + np.flatnonzero(like.layout.rest_of == rest)]
-        if k in broken:
-            rows.append(np.array([sizes[3] + broken[k]]))
-        found.append(np.concatenate(rows))
-    return found
 
 
 def _static_interval(like: Likelihood, end: End, i: int) -> tuple[float, float]:

@@ -21,14 +21,14 @@ import numpy as np
 from config.errors import InputError
 from config.recording import Column
 from config.results.result import Brief
-from sim.composition import Composition
+from sim.composition import STATIC, Composition
 from sim.karnopp import Vector
 from workbench.data.held_out import HELD_OUT_RECORDING, Part, Split, residual_m
 from workbench.fit.fit_result import Fit, Terms, terms
-from workbench.fit.fitting import at_the_noise, problem_of
-from workbench.fit.likelihood import Groups, Likelihood, Rows
+from workbench.fit.fitting import COARSE_ROUNDS, at_the_noise, problem_of
+from workbench.fit.likelihood import Groups, Likelihood, Rows, motion_rows
 from workbench.fit.minimiser import ended
-from workbench.fit.onsets import motion_rows, with_onsets
+from workbench.fit.onsets import with_onsets
 from workbench.model.sampling import NO_LANDING
 from workbench.select.residual_structure import structure
 
@@ -51,6 +51,10 @@ NEGLIGIBLE = 0.1
 """Of the floor: what an error below it is does not matter."""
 MOST_MOVED = 4.0
 """Deviations of a coordinate that a fit leaves open: farther is one in 16 000, and contradicts it."""
+LEFT_OPEN = 0.2
+"""Deviation of a coordinate, of a logarithm mostly, from which on a step along the slope may not lead far enough."""
+MOST_TRIED = 10
+"""Places so far apart, or of two deviations, that are tried of it on either side."""
 SAME_STANDARD_ERRORS, SAME_REDUCTION = 2.0, 0.02
 """Within one of these two models are indistinguishable."""
 BLOCK_S, BLOCK_SAMPLES = 1.0, 10
@@ -152,11 +156,32 @@ def _on_held_out(fit: Fit, part: Part) -> _Told:
     fits = at_the_noise(fit.cost, fit.count)
     if not (fits and z.size) or at_the_noise(like.cost(groups.whole), like.count):
         return _at(like, part, theta, onsets_s, np.zeros(z.size))
-    end = ended(like, z, onsets_s, held=(z, root))
+    begin = min(_open(fit, like, z), key=lambda at: _cost(like, at, root @ (at - z)))
+    end = ended(like, begin, with_onsets(like, like.theta(begin))[0], held=(z, root))
     moved = root @ (end.z - z)
     if np.abs(moved).max() > MOST_MOVED:
         return _at(like, part, theta, onsets_s, np.zeros(z.size))
     return _at(like, part, like.theta(end.z), end.onsets_s, moved)
+
+
+def _open(fit: Fit, like: Likelihood, z: Column) -> list[Column]:
+    """Return coordinates, and others along each that a fit leaves open; static friction is what break-aways say."""
+    deviation = np.sqrt(np.diag(np.linalg.pinv(fit.known.root.T @ fit.known.root)))
+    found = [z]
+    for i, each in enumerate(like.parameters):
+        if deviation[i] > LEFT_OPEN and each.index != STATIC:
+            reach = MOST_TRIED * min(LEFT_OPEN, deviation[i] / (0.5 * MOST_TRIED))
+            for by in np.linspace(-reach, reach, 2 * MOST_TRIED + 1):
+                there = z.copy()
+                there[i] = np.clip(z[i] + by, *each.bounds)
+                found.append(there)
+    return found
+
+
+def _cost(like: Likelihood, z: Column, moved: Column) -> float:
+    """Return the cost at coordinates, and of how far these are from a fit's, in deviations."""
+    _, groups = with_onsets(like, like.theta(z), COARSE_ROUNDS)
+    return like.cost(np.concatenate([groups.whole, moved]))
 
 
 def _likelihood(fit: Fit, part: Part) -> tuple[Likelihood, Vector]:

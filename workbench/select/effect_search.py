@@ -22,7 +22,7 @@ from config.valve_file import ValveFile
 from sim.effect import Effect
 from workbench.data.held_out import Split
 from workbench.fit.fit_result import Fit
-from workbench.fit.fitting import Trial, base_fit, begun_trial, finished, left_off
+from workbench.fit.fitting import Trial, advanced, base_fit, finished, glimpsed, left_off
 from workbench.fit.problem import Problem, problem
 from workbench.fit.threads import on_threads
 from workbench.select.block_errors import block_errors
@@ -176,7 +176,7 @@ class EffectSearch:
             self._fit_beside(number, here, after)
 
     def _fit_beside(self, number: int, here: _Round, names: Sequence[str]) -> None:
-        """Try effects beside a model coarsely, and go on with those that come near the best."""
+        """Race effects beside a model: a glimpse of all, more of the better half, the end of what comes near."""
         # The dearest, which have the most parameters, first: begun last, they would keep one thread alone at work.
         ordered = sorted(names, key=lambda name: -len(self._library[name].parameters))
         trials: dict[str, Trial | str] = {}
@@ -185,12 +185,16 @@ class EffectSearch:
                 trials[name] = trial
                 self._progress(f"step {number}: trying {len(ordered)} effects", done / len(ordered))
         found = {name: each for name, each in trials.items() if isinstance(each, Trial)}
+        better = sorted(found, key=lambda name: found[name].cost)[: max(FEWEST_GONE_ON, (len(found) + 1) // 2)]
+        with closing(on_threads(lambda name: advanced(found[name]), better, self._workers)) as results:
+            found |= dict(zip(better, results, strict=True))
         promise = {
             name: evidence_of(each.terms, len(each.like.parameters), here.before.fit) for name, each in found.items()
         }
         least = min((each.cost for each in found.values()), default=0.0)
-        go_on = set(sorted(found, key=lambda name: found[name].cost)[:FEWEST_GONE_ON])
-        go_on |= {name for name, each in found.items() if promise[name] > 0.0 and each.cost < GONE_ON * least}
+        go_on = set(sorted(better, key=lambda name: found[name].cost)[:FEWEST_GONE_ON])
+        go_on |= {name for name in better if promise[name] > 0.0 and found[name].cost < GONE_ON * least}
+        trials |= found
         with closing(
             on_threads(lambda name: self._fitted(trials[name], name in go_on), ordered, self._workers)
         ) as fits:
@@ -203,7 +207,7 @@ class EffectSearch:
         """Return the trial of a model with an effect added, or why there is none."""
         try:
             known = ValveFile(valve=self._known.valve, effect=before.fit.valve.effect)
-            return begun_trial(self._problem, known, (name,), before.fit)
+            return glimpsed(self._problem, known, (name,), before.fit)
         except InputError as error:
             return error.problem
 
