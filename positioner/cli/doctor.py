@@ -13,7 +13,7 @@ if TYPE_CHECKING:
 
     Check = Callable[[DaemonFile, Path], str]
 
-HELP = "check installation, file, bus, timing and permissions; moves nothing"
+HELP = "check installation, file, bus, timing and permissions; moves nothing unless --nudge-pa"
 EXAMPLE = "positioner doctor daemon.toml"
 
 LEAST_DAYS = 14
@@ -29,6 +29,12 @@ class FailedCheck(Exception):
 def add_arguments(parser: argparse.ArgumentParser) -> None:
     """Declare the command line."""
     add_config(parser)
+    parser.add_argument(
+        "--nudge-pa",
+        type=float,
+        metavar="PA",
+        help="command this much more for a moment, to find when the device samples; no daemon may run meanwhile",
+    )
 
 
 def run(arguments: argparse.Namespace) -> int:
@@ -42,11 +48,13 @@ def run(arguments: argparse.Namespace) -> int:
         travel = file.valve.travel
         stroke = file.valve.plain.said(travel.stroke_m, "g")
         print(f"{'config':12} ok    {path}: {file.valve.name}, stroke {stroke}, {travel.words}")
+    nudge_pa: float | None = arguments.nudge_pa
+    nudged = () if nudge_pa is None else (("sampling", partial(_sampling, nudge_pa)),)
     checks: list[tuple[str, Check, DaemonFile]] = [
         *(
             (name, check, file)
             for file in files
-            for name, check in (("law", _law), ("bus", _bus), ("recorder", _recorder))
+            for name, check in (("law", _law), ("bus", _bus), *nudged, ("recorder", _recorder))
         ),
         *(
             (name, check, files[0])
@@ -57,7 +65,7 @@ def run(arguments: argparse.Namespace) -> int:
     ]
     well = _passes("load", "", partial(_load, files)) and well
     for name, check, file in checks:
-        valve = f"{file.valve.name}: " if len(files) > 1 and name in ("law", "bus", "recorder") else ""
+        valve = f"{file.valve.name}: " if len(files) > 1 and name in ("law", "bus", "sampling", "recorder") else ""
         well = _passes(name, valve, partial(check, file, path)) and well
     return 0 if well else 1
 
@@ -139,6 +147,31 @@ def _bus(file: "DaemonFile", _config: Path) -> str:
     if in_registers := travel_in_registers(file):
         seen.append(in_registers)
     return f"{', '.join(seen)}; but {said}" if said else ", ".join(seen)
+
+
+def _sampling(nudge_pa: float, file: "DaemonFile", _config: Path) -> str:
+    from config.errors import CommandFailed
+    from drivers import driver_for
+    from drivers.boundary import DriverError
+    from positioner.cli.parts.sampling import when_shown
+
+    if file.cycle.pace == "device":
+        return "in lockstep: a reply is of after its command has been obeyed for a period"
+    least_pa = file.device.command_step_pa
+    driver = driver_for(file.device)
+    try:
+        held_pa = driver.open()
+        towards = nudge_pa if held_pa + abs(nudge_pa) <= file.pressure.maximum_pa else -nudge_pa
+        if not least_pa < abs(nudge_pa) <= file.pressure.maximum_pa - file.pressure.minimum_pa:
+            raise FailedCheck(f"--nudge-pa must be more than a digit of the command, {least_pa:g} Pa")
+        shown = when_shown(driver, held_pa, towards)
+    except (DriverError, CommandFailed) as error:
+        raise FailedCheck(str(error)) from None
+    finally:
+        driver.close()
+    if shown.sampling != file.device.sampling:
+        raise FailedCheck(f'it samples {shown.sampling} the command: device.sampling = "{shown.sampling}"')
+    return f"{shown.sampling} the command, whose change showed {shown.replies} replies later"
 
 
 def _supervisory(file: "DaemonFile", _config: Path) -> str:

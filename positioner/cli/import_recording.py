@@ -16,6 +16,9 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
     kinds = "CSV, .xlsx, .mat, HDF5, TDMS, MDF4, Parquet"
     parser.add_argument("file", type=Path, metavar="FILE", help=f"the file: {kinds}, or a recording")
     parser.add_argument("-o", "--out", type=Path, metavar="REC.csv", help="write the recording")
+    parser.add_argument(
+        "--inspect", action="store_true", help="ask what FILE leaves open, and write the mapping to FILE.mapping.toml"
+    )
     add_export_arguments(parser)
 
 
@@ -29,6 +32,8 @@ def run(arguments: argparse.Namespace) -> int:
     from workbench.imports.own_format import own_recording
 
     take_mapping(arguments)
+    if arguments.inspect:
+        return _inspect(arguments)
     if arguments.out is not None:
         recording_writable(arguments.out, "-o")
     if arguments.column:
@@ -49,6 +54,35 @@ def run(arguments: argparse.Namespace) -> int:
         recording.write(arguments.out)
         print(f"{arguments.out}: {len(recording)} rows, to be read without --column")
     return 0
+
+
+def _inspect(arguments: argparse.Namespace) -> int:
+    """Show what the file holds, ask what it leaves open, write it down, and say what reads it."""
+    import shlex
+
+    from workbench.imports.export_preview import preview
+    from workbench.imports.import_questions import answered
+    from workbench.imports.mapping_file import write_mapping_file
+
+    found = preview(arguments.file, arguments.sheet)
+    print(f"{arguments.file}: {found.summary()}")
+    mapping = arguments.file.with_name(f"{arguments.file.name}.mapping.toml")
+    table = answered(found, _ask).model_copy(update={"sheet": arguments.sheet, "decimal": arguments.decimal})
+    write_mapping_file(mapping, table)
+    print(f"{mapping}: written; all exports like this one are read with it:")
+    print(f"positioner import {shlex.quote(str(arguments.file))} --mapping {shlex.quote(str(mapping))} -o rec.csv")
+    return 0
+
+
+def _ask(question: str, otherwise: str) -> str:
+    from config.errors import InputError
+
+    print(f"{question} {f'[{otherwise}] ' if otherwise else ''}", end="", flush=True)
+    try:
+        return input().strip() or otherwise
+    except EOFError:
+        print()
+        raise InputError("--inspect", "the answers ended before the questions; nothing was written") from None
 
 
 def _list(arguments: argparse.Namespace) -> int:

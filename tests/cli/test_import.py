@@ -1,5 +1,6 @@
 """`positioner import` and `valve`, and exports in the other commands: from a file of another program to figures."""
 
+import io
 import re
 import shlex
 from collections.abc import Callable
@@ -238,18 +239,47 @@ SCADA = "Zeit;Hub;Stell;Status\n" + "".join(
 )
 
 
-def test_a_mapping_file_reads_an_export_as_its_words_do(tmp_path: Path) -> None:
-    path, out, mapping = tmp_path / "trend.csv", tmp_path / "rec.csv", tmp_path / "map.toml"
+def inspected(path: Path, answers: str, monkeypatch: pytest.MonkeyPatch) -> int:
     path.write_text(SCADA)
-    mapping.write_text(
-        '[export]\ncolumn = ["time_s=Zeit:s", "position_m=Hub:%", "command_pa=Stell:bar"]\n'
-        'status = ["Status=Good"]\nstroke_m = 0.04\n'
-    )
+    monkeypatch.setattr("sys.stdin", io.StringIO(answers))
+    return main(["import", "--inspect", str(path)])
+
+
+def test_what_a_file_leaves_open_is_asked_and_written_down_for_next_time(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
+) -> None:
+    path, out = tmp_path / "trend.csv", tmp_path / "rec.csv"
+    assert inspected(path, "s\n%\nbar\nGood\n0.04\n", monkeypatch) == 0
+    said = capsys.readouterr().out
+    for question in ("unit of 'Zeit'", "unit of 'Hub'", "unit of 'Stell'", "'Status' holds Bad, Good", "the stroke"):
+        assert question in said
+    mapping = tmp_path / "trend.csv.mapping.toml"
+    assert 'command_pa=Stell:bar"' in mapping.read_text()
     assert main(["import", str(path), "--mapping", str(mapping), "-o", str(out)]) == 0
     read = Recording.read(out)
     assert read.position_m[0] == pytest.approx(0.5 * 0.04)
     assert read.columns["command_pa"][0] == pytest.approx(40e3)
     assert np.isnan(read.position_m[5]), "a row that is not good has no value"
+    assert inspected(path, "s\n%\nbar\nGood\n0.04\n", monkeypatch) == 2
+    assert "is there already" in capsys.readouterr().err
+
+
+@pytest.mark.parametrize(
+    ("answers", "said"),
+    [
+        ("s\n%\n", "--inspect: the answers ended before the questions; nothing was written"),
+        ("s\n%\nbar\n\nforty\n", "the stroke: must be a number, as 0.04; got 'forty'"),
+        ("s\nfathom\nbar\n\n", "unknown unit 'fathom'"),
+    ],
+)
+def test_a_wrong_answer_is_one_line_and_nothing_is_written(
+    answers: str, said: str, tmp_path: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
+) -> None:
+    assert inspected(tmp_path / "trend.csv", answers, monkeypatch) == 2
+    error = capsys.readouterr().err
+    assert said in error
+    assert error.count("\n") == 1
+    assert not (tmp_path / "trend.csv.mapping.toml").exists()
 
 
 @pytest.mark.parametrize(

@@ -15,6 +15,7 @@ from config.device import ModbusTcpDevice
 from config.modbus_map import ActionCodes, ModbusMap, Place, StatusBits
 from config.quantities import DeviceStatus
 from drivers import driver_for
+from positioner.cli.parts.sampling import when_shown
 from positioner.control.settings import Settings
 from positioner.daemon.link import SETTINGS_EVERY, Link, LinkSettings
 from positioner.daemon.pacing import RealTimePace
@@ -249,6 +250,29 @@ def test_a_device_that_was_restarted_between_two_commands_is_known_by_its_settin
     assert found.held_pa == 50e3, "it was looked at, and not commanded"
     assert {each.quality for each in samples} == {Quality.GOOD}
     assert device.slave.get_values("registers", timeout, 1) == (20,), "it was told again"
+
+
+@pytest.mark.parametrize("sampling", ["before", "after"])
+def test_when_a_device_samples_is_seen_by_a_change_of_the_command(device: PlainDevice, sampling: str) -> None:
+    """One latches its pressure before it takes a command, the other makes it when it is asked."""
+    pressure = 12
+    device.show(pressure, 40)
+    answers = device.slave.handle_request
+
+    def handle_request(request: bytes, broadcast: bool = False) -> bytes:
+        if request[0] == defines.WRITE_SINGLE_REGISTER:
+            (commanded,) = struct.unpack(">H", request[3:5])
+            device.show(pressure, device.command if sampling == "before" else commanded)
+        reply: bytes = answers(request, broadcast)
+        return reply
+
+    device.slave.handle_request = handle_request
+    described = device.described(None)
+    places = described.map.model_copy(update={"pressure_pa": Place(address=pressure, type="uint16", scale=1000.0)})
+    driver = driver_for(described.model_copy(update={"map": places}))
+    shown = when_shown(driver, driver.open(), 2e3)
+    assert (shown.sampling, device.command) == (sampling, 40), "and the command is put back"
+    driver.close()
 
 
 def test_neither_an_exception_nor_a_number_that_is_none_ends_a_good_connection(device: PlainDevice) -> None:

@@ -27,5 +27,5 @@ From the file to the recording:
     control_loop                            whether it is a loop's, OP, PV and SP, and tells of no stem
     loop_reader                             a loop read: time, OP, PV, SP and mode
     column_preview, export_preview          what a file holds, looked at by the code that reads it
-    mapping_file                            how an export is read, kept in a file for next time
+    import_questions, mapping_file          what they leave open, asked; the answers, kept in a file for next time
 """

@@ -1,4 +1,4 @@
-"""A mapping written down: the words that read an export, as a file that every command takes.
+"""A mapping written down for next time: the words that read an export, as a file that every command takes.
 
 [export]
 column = ["time_s=Time", "position_m=PV:%", "command_pa=OUT:bar"]
@@ -6,6 +6,7 @@ stroke_m = 0.04
 status = ["Quality=Good"]
 """
 
+import json
 from pathlib import Path
 from typing import Annotated, Literal
 
@@ -48,3 +49,21 @@ def read_mapping_file(path: Path) -> MappingTable:
     except InputError as error:
         raise InputError(str(path), f"export.{error.source.removeprefix('--')}: {error.problem}") from None
     return table
+
+
+def write_mapping_file(path: Path, table: MappingTable) -> None:
+    """Write it.
+
+    Raises:
+        InputError: it is there already, or cannot be written.
+    """
+    said = table.model_dump(exclude_defaults=True)
+    # A JSON string, number or list of them is a TOML one.
+    text = "[export]\n" + "".join(f"{key} = {json.dumps(value, ensure_ascii=False)}\n" for key, value in said.items())
+    try:
+        with path.open("x", encoding="utf-8") as file:
+            file.write(text)
+    except FileExistsError:
+        raise InputError(str(path), "is there already: delete it, or read with it (--mapping)") from None
+    except OSError as error:
+        raise InputError(str(path), f"cannot be written: {error.strerror}") from None

@@ -16,6 +16,7 @@ A command imports from here what it needs when it runs.
     extended_valves                             `[law] valve` of a daemon's file, worked out
     config_argument                             which file a command is about
     output_files                                what `--out` and `--json` ask for
+    sampling                                    when a device samples, for `doctor --nudge-pa`
     authority, progress, passing_line           a test certificate authority; progress on a terminal, in one line there
     breaking_off                                Ctrl-C during long work: what is known is said
 """
