@@ -11,6 +11,8 @@ What a daemon identified is compared with the truth here, where it is known; no 
 
 `--hidden` gives the valve an effect that nobody has told the daemon, finds it in the daemon's own recording, gives the
 daemon the extended valve and makes the same steps again (`parts.hidden_demo`).
+
+`--loop flow`, in a clone alone, says what each law makes of a flow loop in virtual time (`benchmarks/flow`).
 """
 
 import argparse
@@ -27,6 +29,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING
 
 from config.codes import Mode
+from positioner.cli.parts.clone_only import benchmark
 from positioner.cli.parts.demo_folder import demo_folder, recording_in
 from positioner.cli.parts.output_files import writable, write_json
 from positioner.cli.parts.passing_line import passing
@@ -193,6 +196,7 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
         action="store_true",
         help="add an effect to the valve, find it in the daemon's recording, and give it to the law",
     )
+    parser.add_argument("--loop", choices=("flow",), help="put each law into a flow loop in virtual time, in a clone")
     parser.add_argument("--out", type=Path, metavar="DIR", help="folder for picture, recordings, files and logs")
     parser.add_argument("--json", type=Path, metavar="FILE", help="write the result as JSON")
 
@@ -200,6 +204,10 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
 def run(arguments: argparse.Namespace) -> int:
     """Run it; exit status 1 when a step ends too far off, or a ratio is identified too badly."""
     writable(arguments.json, "--json")
+    if arguments.loop:
+        flow = benchmark("flow", "--loop flow")
+        status: int = flow.compared(flow.CASES, arguments.out)
+        return status
     if arguments.hidden:
         from positioner.cli.parts.hidden_demo import run_hidden
 

@@ -55,6 +55,7 @@ COMMANDS = {
     "loops": "sim,plot",
     "bench": "sim,plot",
     "hide": "sim,plot",
+    "reproduce": "sim,plot",
     "certify": "",
     "certificates": "tls",
     "completion": "completion",
