@@ -33,4 +33,4 @@ def test_who_keeps_a_memory_is_not_told_to_type_a_law_in_which_would_set_it_asid
 ) -> None:
     monkeypatch.setattr("positioner.cli.identify.connected", lambda _: Identified())
     assert main(["identify"]) == 0
-    assert "[memory] folder in the daemon's file keeps it, or without that:\n[law]" in capsys.readouterr().out
+    assert "without it, copy:\n[law]" in capsys.readouterr().out

@@ -43,7 +43,11 @@ def test_the_seed_valve_has_the_corrected_static_friction() -> None:
 @pytest.mark.parametrize(
     ("wrong", "right", "said"),
     [
-        ("mass_lb = 3.0", "mass_kg = 1.0", "valve.mass_lb: unknown key; allowed here: coulomb_n, deadzone_ratio,"),
+        (
+            "mass_lb = 3.0",
+            "mass_kg = 1.0",
+            "valve.mass_lb: unknown key; allowed here: actuator, coulomb_n, deadzone_ratio,",
+        ),
         ("mass_kg = -1.0", "mass_kg = 1.0", "valve.mass_kg: allowed is 1e-09 to 1e+09, got -1.0"),
         ("mass_kg = 1e-320", "mass_kg = 1.0", "valve.mass_kg: allowed is 1e-09 to 1e+09, got 1e-320"),
         (

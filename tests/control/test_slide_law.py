@@ -241,7 +241,8 @@ def test_two_slides_follow_a_slow_ramp_only_when_they_save_more_than_they_cost()
     references = np.repeat(0.5 + 0.04 / 60 * np.arange(60), 5)
     path = np.concatenate([loop.step_to(float(each), cycles=5) for each in references[::5]])
     assert np.abs(np.diff(path)).sum() < 0.04 + 4 * 2 * 1.3 * LEAST
-    assert np.sqrt(np.mean(np.square(path - references))) < 0.3 * LEAST
+    least_rms = LEAST / np.sqrt(12.0)  # what a stem leaves that can only jump by LEAST
+    assert np.sqrt(np.mean(np.square(path - references))) < 1.3 * least_rms
     assert abs(loop.step_to(0.54)[-1] - 0.54) < 1e-3
 
 

@@ -104,7 +104,7 @@ def test_a_frame_sent_while_a_reader_has_a_hello_in_hand_goes_to_the_newcomer(
         return newcomer_at(port)
 
     monkeypatch.setattr(end, "_newcomer", slowly)
-    monkeypatch.setattr(can_bus, "LOOK_S", 0.0)
+    monkeypatch.setattr(can_bus, "BUS_LOOK_S", 0.0)
     reader = Thread(target=end.recv, args=(0.5,))
     reader.start()
     newcomer = join()

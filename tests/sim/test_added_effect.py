@@ -20,7 +20,6 @@ from workbench.select.equivalence import algebraic_class
 ROOT = Path(__file__).parents[2]
 ROOMS = ("config", "signals", "webpage", "fieldbus", "drivers", "positioner", "northbound", "sim", "workbench")
 KNOWN = {
-    "workbench/forces/force_balance.py": "a second library, of linear columns",
     "positioner/cli/parts/hidden_demo.py": "the demo's candidates, few lest it take minutes",
 }
 """Modules that still name three effects and more."""

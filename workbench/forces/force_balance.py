@@ -58,6 +58,8 @@ PLACES = 40
 """Cells of the travel in which a residual's scatter is taken."""
 NORMAL = 1.4826
 """Standard deviation of a normal distribution over its median absolute deviation."""
+MOST_SHARES = 1e12
+"""Times F_c beyond which a coefficient is no share of it: there is none."""
 OUTSIDE_STANDARD_ERRORS = 3.0
 """Standard errors by which a coefficient lies beyond its range before that is said."""
 
@@ -309,9 +311,7 @@ class Balance:
     def _own(self, model: ForceModel, values: Mapping[str, float], fitted: dict[str, float]) -> dict[str, float]:
         """Return coefficients, or their deviations, as the effects' own: shares of F_c, where that is what they are."""
         scaled = {each.name for each in model.terms if each.scales}
-        # Without any F_c a growth is beyond every share of it.
-        coulomb_n = values["coulomb_n"] or np.finfo(float).tiny
-        return {name: value / coulomb_n if name in scaled else value for name, value in fitted.items()}
+        return {name: _share(value, values["coulomb_n"]) if name in scaled else value for name, value in fitted.items()}
 
     def _range_violation(
         self, columns: list[_Column], reduced: Mapping[int, Matrix], trained: Sequence[int], least: Column
@@ -447,3 +447,10 @@ def floor_of(rows: Rows, residual_n: Column) -> float | None:
 def median_error_n(error_n: Column) -> float:
     """Return the median of |error|, (n,), as a standard deviation, N."""
     return float(NORMAL * np.median(np.abs(error_n)))
+
+
+def _share(value: float, of: float) -> float:
+    """Return a share; of next to nothing as many times it as says that it is beyond every share."""
+    if abs(value) > MOST_SHARES * of:
+        return float(np.copysign(MOST_SHARES, value))
+    return value / of if of else 0.0
