@@ -75,16 +75,16 @@ class Engine:
     def base_fit(self, _: object, valve: ValveFile, **__: object) -> Fit:
         return self._fit(*(each.name for each in valve.effect))
 
-    def glimpsed(self, _: object, known: ValveFile, effects: Sequence[str], __: Fit) -> Trial:
+    def glimpse(self, _: object, known: ValveFile, effects: Sequence[str], __: Fit) -> Trial:
         return ByHand.of(self._fit(*(each.name for each in known.effect), *effects))
 
-    def advanced(self, trial: ByHand) -> Trial:
+    def advance(self, trial: ByHand) -> Trial:
         return trial
 
-    def finished(self, _: object, trial: ByHand) -> Fit:
+    def finish(self, _: object, trial: ByHand) -> Fit:
         return trial.fit
 
-    def left_off(self, _: object, trial: ByHand) -> Fit:
+    def leave_off(self, _: object, trial: ByHand) -> Fit:
         return replace(trial.fit, cost=COARSE * trial.fit.cost, rms_m=COARSE * trial.fit.rms_m)
 
     def preview(self, _: Fit, __: object, library: Mapping[str, Effect], ___: int) -> tuple[TangentScore, ...]:
@@ -102,7 +102,7 @@ def searched(monkeypatch: pytest.MonkeyPatch) -> Searched:
         ends: Ends, *library: str, workers: int = 2, broken_off_after: float = np.inf
     ) -> tuple[EffectStep, ...]:
         engine = Engine(ends, broken_off_after)
-        for name in ("base_fit", "glimpsed", "advanced", "finished", "left_off", "evaluated", "preview"):
+        for name in ("base_fit", "glimpse", "advance", "finish", "leave_off", "evaluated", "preview"):
             monkeypatch.setattr(effect_search, name, getattr(engine, name))
         search = search_of({name: LIBRARY[name] for name in library}, monkeypatch, workers)
         base = search.base(valve_with())

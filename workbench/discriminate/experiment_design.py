@@ -40,7 +40,7 @@ from workbench.data.record import Record, ready
 from workbench.fit.fit_result import Fit
 from workbench.fit.fitting import problem_of
 from workbench.fit.likelihood import Likelihood, soft
-from workbench.fit.minimiser import derivatives, ended
+from workbench.fit.minimiser import derivatives, descend
 from workbench.fit.onsets import with_onsets
 from workbench.fit.threads import on_threads
 from workbench.select.experiment import LENGTH_S, MARGIN, MENU, REST_S, Command, Experiment, Shape
@@ -395,7 +395,7 @@ class Rivalry:
         like, theta = self._like(j, answer), self._compositions[j].theta
         z = like.coordinates(theta)
         root = np.asarray(np.linalg.cholesky(self._information[j]).T, dtype=np.float64)
-        held = ended(like, z, with_onsets(like, theta)[0], held=(z, root))
+        held = descend(like, z, with_onsets(like, theta)[0], held=(z, root))
         return float(soft(held.groups.whole).sum())
 
 

@@ -20,7 +20,7 @@ from workbench.data.record import Record, ready, require_few_samples
 from workbench.data.stretches import informative
 from workbench.fit.fit_result import Fit, Terms, fit_at, terms
 from workbench.fit.likelihood import Likelihood
-from workbench.fit.minimiser import COARSE, GLIMPSE, WHOLE, Effort, End, begun, derivatives, ended
+from workbench.fit.minimiser import COARSE, GLIMPSE, WHOLE, Effort, End, begin_by_landings, derivatives, descend
 from workbench.fit.onsets import with_onsets
 from workbench.fit.problem import Problem, problem
 from workbench.fit.starts import (
@@ -126,9 +126,9 @@ def _base_fit(
     composition = Composition.from_file(valve)
     like = of.likelihood(composition, free)
     first, *others = starts(like)
-    ends = [_settled(like, _from_afar(like, first))]
+    ends = [_settle(like, _from_afar(like, first))]
     if not at_the_noise(ends[0].cost, like.count):
-        ends += on_threads(lambda z: _settled(like, _from_afar(like, z)), others, workers)
+        ends += on_threads(lambda z: _settle(like, _from_afar(like, z)), others, workers)
     best = min(ends, key=lambda each: each.cost)
     return _best(of, like, ends), not at_the_noise(best.cost, like.count)
 
@@ -158,7 +158,7 @@ def effect_fit(
     Raises:
         InputError: an unknown effect, one that is there, or one that the record cannot show.
     """
-    return finished(of, advanced(glimpsed(of, valve, effects, base, free=free, workers=workers, points=points)))
+    return finish(of, advance(glimpse(of, valve, effects, base, free=free, workers=workers, points=points)))
 
 
 @dataclass(frozen=True, slots=True)
@@ -181,7 +181,7 @@ class Trial:
 
 
 @linear_algebra_alone()
-def glimpsed(
+def glimpse(
     of: Problem,
     valve: ValveFile,
     effects: Sequence[str],
@@ -203,13 +203,13 @@ def glimpsed(
     for i, name in enumerate(BASE):
         sheet[i] = getattr(valve.valve, name)
     off = like.coordinates(fitted.theta)
-    searches: list[Callable[[], End]] = [lambda: ended(like, off, base.onsets_s, GLIMPSE)]
+    searches: list[Callable[[], End]] = [lambda: descend(like, off, base.onsets_s, GLIMPSE)]
     if like.run.hidden:  # friction stands in for a play where slides land: landings do not choose its width
         begins = strewn_starts(like, added, fitted, points)
         searches += [lambda z=z: _from_afar(like, z, GLIMPSE) for z in begins]  # type: ignore[misc]
     else:
         near = near_start(like, added, fitted, points)
-        searches.append(lambda: ended(like, near, base.onsets_s, GLIMPSE))
+        searches.append(lambda: descend(like, near, base.onsets_s, GLIMPSE))
         if not at_the_noise(base.cost, base.count):
             chosen = partial(with_strengths, like, added, points=points)
             begins = starts_by_landings(like, added, fitted, Origin(sheet), points)
@@ -219,30 +219,30 @@ def glimpsed(
     other_order = in_other_order(like, best.z)
     if other_order is not None and not at_the_noise(best.cost, like.count):
         onsets_s, _ = with_onsets(like, like.theta(other_order), COARSE_ROUNDS)
-        ends.append(ended(like, other_order, onsets_s, GLIMPSE))
+        ends.append(descend(like, other_order, onsets_s, GLIMPSE))
     return Trial(like, tuple(sorted(ends, key=lambda each: each.cost)))
 
 
 @linear_algebra_alone()
-def advanced(trial: Trial) -> Trial:
+def advance(trial: Trial) -> Trial:
     """Search on in the best valley of a trial, and in the next best if that leaves something."""
     like, (first, *others) = trial.like, trial.valleys
-    ends = [ended(like, first.z, first.onsets_s, COARSE)]
+    ends = [descend(like, first.z, first.onsets_s, COARSE)]
     if not at_the_noise(ends[0].cost, like.count) and others and others[0].cost < NEAR * first.cost:
-        ends.append(ended(like, others[0].z, others[0].onsets_s, COARSE))
+        ends.append(descend(like, others[0].z, others[0].onsets_s, COARSE))
     return Trial(like, tuple(sorted((*ends, *others[len(ends) - 1 :]), key=lambda each: each.cost)))
 
 
 @linear_algebra_alone()
-def finished(of: Problem, trial: Trial) -> Fit:
+def finish(of: Problem, trial: Trial) -> Fit:
     """Search to the end from the best valley of a trial, and from the next if it is nearly as good."""
     like, (first, *others) = trial.like, trial.valleys
     near = [first, *(each for each in others[:1] if each.cost < NEAR * first.cost)]
-    return _best(of, like, [_settled(like, ended(like, each.z, each.onsets_s)) for each in near])
+    return _best(of, like, [_settle(like, descend(like, each.z, each.onsets_s)) for each in near])
 
 
 @linear_algebra_alone()
-def left_off(of: Problem, trial: Trial) -> Fit:
+def leave_off(of: Problem, trial: Trial) -> Fit:
     """Return the fit of a trial that is not gone on with, as far as it came."""
     best = trial.valleys[0]
     jacobian = derivatives(trial.like, best.z, best.onsets_s)
@@ -263,7 +263,7 @@ def refit(of: Problem, found: Fit) -> Fit:
     like = of.likelihood(composition, tuple(found.parameters))
     z = like.coordinates(composition.theta)
     onsets_s, _ = with_onsets(like, composition.theta)
-    return _best(of, like, [ended(like, z, onsets_s)])
+    return _best(of, like, [descend(like, z, onsets_s)])
 
 
 def extended(valve: ValveFile, effects: Sequence[str], known: ValveParameters) -> Composition:
@@ -299,19 +299,19 @@ def _from_afar(
     chosen: Callable[[Vector], Vector] = lambda landed: landed,
 ) -> End:
     """Search from a place of which nothing is known: landings first, then what acts in time, onsets, and all."""
-    landed = chosen(begun(like, z))
+    landed = chosen(begin_by_landings(like, z))
     rounds = None if effort == WHOLE else COARSE_ROUNDS
     onsets_s, _ = with_onsets(like, like.theta(landed), rounds)
-    return ended(like, landed, onsets_s, effort)
+    return descend(like, landed, onsets_s, effort)
 
 
-def _settled(like: Likelihood, end: End) -> End:
+def _settle(like: Likelihood, end: End) -> End:
     """Search on where other onsets suit the valve better than those that a search came to, as long as it pays."""
     for _ in range(SETTLED_IN):
         onsets_s, groups = with_onsets(like, like.theta(end.z))
         if like.cost(groups.whole) > end.cost - NATS:
             break
-        there = ended(like, end.z, onsets_s)
+        there = descend(like, end.z, onsets_s)
         end = min(end, there, key=lambda each: each.cost)
     return end
 

@@ -13,8 +13,8 @@ J is taken by forward differences, one simulation a parameter and one for all on
 shows (Broyden), move by move:  J <- J + (dr - J dv) dv' / |dv|^2, v = (z, o), lengths by the curvature. It is taken
 anew where a step falls short of what it promised, and before an end is believed.
 
-`begun` lets the landings lead first, with the data sheet as a weak prior: where slides end hangs on forces alone, so
-that a start far off finds its valley there.
+`begin_by_landings` lets the landings lead first, with the data sheet as a weak prior: where slides end hangs on forces
+alone, so that a start far off finds its valley there.
 """
 
 from collections.abc import Callable
@@ -143,7 +143,7 @@ class Ground:
         return Slopes(by_z, np.where(self.of < at.o.size, shifted, 0.0))
 
 
-def lowest(ground: Ground, begin: Place, effort: Effort) -> Place:
+def minimise(ground: Ground, begin: Place, effort: Effort) -> Place:
     """Return the place to which damped steps lead with so much effort."""
     left, enough, rows = effort.simulations, effort.enough, ground.rows
 
@@ -234,7 +234,7 @@ class End:
     """Of the residuals by z and onsets, (rows, parameters + moves); empty where it was not asked for."""
 
 
-def begun(like: Likelihood, z: Vector) -> Vector:
+def begin_by_landings(like: Likelihood, z: Vector) -> Vector:
     """Return the coordinates to which landings and break-aways lead, (parameters,)."""
     onsets_s = like.run.first_onsets_s()
     prior = np.array([PRIOR.get(each.index, np.inf) for each in like.parameters])
@@ -249,10 +249,10 @@ def begun(like: Likelihood, z: Vector) -> Vector:
 
     of = np.zeros(like.layout.per_rest.size + like.broken.size + start.size, dtype=np.int64)
     ground = Ground(rows, of, Place(low, none), Place(high, none), like.weights.soft)
-    return lowest(ground, Place(start, none), TO_BEGIN).z
+    return minimise(ground, Place(start, none), TO_BEGIN).z
 
 
-def ended(
+def descend(
     like: Likelihood,
     z: Vector,
     onsets_s: Vector | None = None,
@@ -266,7 +266,7 @@ def ended(
     """
     ground = _ground(like, held)
     begin_s = like.run.first_onsets_s() if onsets_s is None else onsets_s
-    found = lowest(ground, Place(z, _periods(like, begin_s)), effort)
+    found = minimise(ground, Place(z, _periods(like, begin_s)), effort)
     onsets_s = _seconds(like, found.o)
     groups = like.at(like.theta(found.z), onsets_s)
     jacobian = derivatives(like, found.z, onsets_s) if effort == WHOLE else np.empty((0, 0))
@@ -283,7 +283,7 @@ def derivatives(like: Likelihood, z: Vector, onsets_s: Vector) -> Vector:
 
 
 def _ground(like: Likelihood, held: tuple[Vector, Vector] | None = None) -> Ground:
-    """Return the ground of a likelihood, its coordinates held as of `ended`."""
+    """Return the ground of a likelihood, its coordinates held as of `descend`."""
     low, high = _bounds(like)
     earliest_s, latest_s = like.run.bounds_s(SEARCH.reach)
 

@@ -27,7 +27,7 @@ from workbench.data.held_out import HELD_OUT_RECORDING, Part, Split, residual_m
 from workbench.fit.fit_result import Fit, Terms, terms
 from workbench.fit.fitting import COARSE_ROUNDS, at_the_noise, problem_of
 from workbench.fit.likelihood import Groups, Likelihood, Rows, motion_rows
-from workbench.fit.minimiser import ended
+from workbench.fit.minimiser import descend
 from workbench.fit.onsets import with_onsets
 from workbench.model.sampling import NO_LANDING
 from workbench.select.residual_structure import structure
@@ -157,7 +157,7 @@ def _on_held_out(fit: Fit, part: Part) -> _Told:
     if not (fits and z.size) or at_the_noise(like.cost(groups.whole), like.count):
         return _at(like, part, theta, onsets_s, np.zeros(z.size))
     begin = min(_open(fit, like, z), key=lambda at: _cost(like, at, root @ (at - z)))
-    end = ended(like, begin, with_onsets(like, like.theta(begin))[0], held=(z, root))
+    end = descend(like, begin, with_onsets(like, like.theta(begin))[0], held=(z, root))
     moved = root @ (end.z - z)
     if np.abs(moved).max() > MOST_MOVED:
         return _at(like, part, theta, onsets_s, np.zeros(z.size))

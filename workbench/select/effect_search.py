@@ -22,7 +22,7 @@ from config.valve_file import ValveFile
 from sim.effect import Effect
 from workbench.data.held_out import Split
 from workbench.fit.fit_result import Fit
-from workbench.fit.fitting import Trial, advanced, base_fit, finished, glimpsed, left_off
+from workbench.fit.fitting import Trial, advance, base_fit, finish, glimpse, leave_off
 from workbench.fit.problem import Problem, problem
 from workbench.fit.threads import on_threads
 from workbench.select.block_errors import block_errors
@@ -186,7 +186,7 @@ class EffectSearch:
                 self._progress(f"step {number}: trying {len(ordered)} effects", done / len(ordered))
         found = {name: each for name, each in trials.items() if isinstance(each, Trial)}
         better = sorted(found, key=lambda name: found[name].cost)[: max(FEWEST_GONE_ON, (len(found) + 1) // 2)]
-        with closing(on_threads(lambda name: advanced(found[name]), better, self._workers)) as results:
+        with closing(on_threads(lambda name: advance(found[name]), better, self._workers)) as results:
             found |= dict(zip(better, results, strict=True))
         promise = {
             name: evidence_of(each.terms, len(each.like.parameters), here.before.fit) for name, each in found.items()
@@ -207,7 +207,7 @@ class EffectSearch:
         """Return the trial of a model with an effect added, or why there is none."""
         try:
             known = ValveFile(valve=self._known.valve, effect=before.fit.valve.effect)
-            return glimpsed(self._problem, known, (name,), before.fit)
+            return glimpse(self._problem, known, (name,), before.fit)
         except InputError as error:
             return error.problem
 
@@ -216,7 +216,7 @@ class EffectSearch:
         if isinstance(trial, str):
             return trial
         try:
-            fit = finished(self._problem, trial) if to_the_end else left_off(self._problem, trial)
+            fit = finish(self._problem, trial) if to_the_end else leave_off(self._problem, trial)
             return self.evaluated(fit)
         except InputError as error:
             return error.problem

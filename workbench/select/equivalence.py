@@ -39,7 +39,7 @@ DETECTABLE = 0.3
 WIDTHS = 16
 LEAST_PLAY = 4.0
 """Floors; a play that narrow is not worth saying."""
-PLACES = (0.0, 0.1373, 0.3819, 0.6181, 0.8771)
+STROKE_SHARES = (0.0, 0.1373, 0.3819, 0.6181, 0.8771)
 """Of the stroke: none is a multiple of another, as those of a quantum are."""
 ROUNDED = 1e-12
 """Of the stroke: as far as lengths come out different by the arithmetic alone."""
@@ -170,7 +170,7 @@ def unseen_without_spring(effect: Effect, valve: ValveParameters) -> str:
         return ""
     laws = interpreted((effect,))
     theta = [*([0.0] * len(BASE)), *effect.strengths(valve)[0]]
-    places_m = [part * valve.stroke_m for part in PLACES]
+    places_m = [part * valve.stroke_m for part in STROKE_SHARES]
     off_m = [laws.sensor(x, x, 0.0, laws.Stem(0.0, x, 0.0, 0.0), theta, ())[1] - x for x in places_m]
     return "shifts the indication, and a drive without a spring stands anywhere" if _all_same(off_m, valve) else ""
 

@@ -19,7 +19,7 @@ SETTLE = 5
 """Exchanges before the change."""
 WITHIN_S = 10.0
 """For which the pressure is awaited, however often the device answers: an I/P converter needs a second or two."""
-SHOWN = 0.5
+SHOWN_SHARE = 0.5
 """Of the change: a pressure that shows so much of it is of after the command."""
 
 
@@ -68,7 +68,7 @@ def _shown(driver: "Driver", held_pa: float, nudge_pa: float) -> Shown:
     end_s = time.monotonic() + WITHIN_S
     for replies in count():
         shown_pa = driver.exchange(held_pa + nudge_pa).pressure_pa
-        if shown_pa is not None and (shown_pa - before_pa) / nudge_pa > SHOWN:
+        if shown_pa is not None and (shown_pa - before_pa) / nudge_pa > SHOWN_SHARE:
             return Shown("before" if replies else "after", replies)
         if time.monotonic() > end_s:
             break
