@@ -17,7 +17,7 @@ from workbench.compare.comparison import ADEQUATE
 from workbench.data.held_out import Split, residual_m
 from workbench.fit.fit_result import NOTHING, Fit
 from workbench.select.block_errors import BlockErrors, block_errors
-from workbench.select.effect_acceptance import LEAST_BIC
+from workbench.select.effect_acceptance import LEAST_HELD_OUT
 
 
 @dataclass(frozen=True, slots=True, repr=False)
@@ -37,7 +37,7 @@ class AsGiven(Brief):
 
     def holds(self, best: BlockErrors) -> bool:
         """Whether the recording does not tell the file from the model that was found, whose errors these are."""
-        return 2.0 * best.held_out.nats_above(self.errors.held_out) <= LEAST_BIC
+        return 2.0 * best.held_out.nats_above(self.errors.held_out) <= LEAST_HELD_OUT
 
     def is_off(self, best: BlockErrors) -> bool:
         """Whether it leaves what `compare` would not call adequate, and the model that was found does better."""
