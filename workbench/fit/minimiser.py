@@ -81,7 +81,7 @@ PRIOR = {SPRING: 0.15, COULOMB: 0.4, VISCOUS: 0.7, STATIC: 0.1}
 TO_BEGIN = Effort(40, 1e-2)
 """By landings alone: three times as long ends in the same valleys."""
 GLIMPSE = Effort(20, 1e-2)
-"""Derivatives and a dozen steps: of 19 records with one effect it is then among the first three (`few_slips`)."""
+"""Derivatives and a dozen steps: of 22 records of one effect that one is among the first three then."""
 COARSE = Effort(60, 1e-2)
 """To tell a valley from another."""
 WHOLE = Effort(400, 1e-4)
