@@ -21,7 +21,7 @@ from workbench.compare.measures import fit_percent
 from workbench.data.noise_floor import told
 from workbench.data.record import Record, ready
 from workbench.fit.fitted_parameter import Fitted, draw_parameters, parameter_columns, parameter_table
-from workbench.fit.likelihood import Groups, Likelihood, Rows, soft
+from workbench.fit.likelihood import Groups, Likelihood, Rows, soft, soft_weight
 from workbench.fit.minimiser import End
 from workbench.fit.problem import Problem
 from workbench.fit.uncertainty import RISE_95, Combination, Uncertainty, uncertainty
@@ -281,7 +281,7 @@ def _fitted(like: Likelihood, end: End, determined: Uncertainty, i: int) -> Fitt
     low, high = parameter.bounds
     near = AT_BOUND * (high - low)
     at_low, at_high = bool(z[i] < low + near), bool(z[i] > high - near)
-    r, weight = end.groups.whole, 1.0 / np.sqrt(1.0 + (end.groups.whole / like.weights.soft) ** 2)
+    r, weight = end.groups.whole, soft_weight(end.groups.whole, like.weights.soft)
     column = end.jacobian[:, i]
     slope, curvature = float(column @ (weight * r)), float(column**2 @ weight)
     outward = slope if at_low else -slope if at_high else 0.0

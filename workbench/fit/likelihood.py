@@ -276,3 +276,13 @@ def with_static(like: Likelihood, theta: Vector, path: ToldPath) -> Vector:
 def soft(r: Vector, scale: float = WEIGHTS.soft) -> Vector:
     """Return the soft-L1 cost of each residual."""
     return np.asarray(scale**2 * (np.sqrt(1.0 + (r / scale) ** 2) - 1.0))
+
+
+def soft_weight(r: Vector, scale: float = WEIGHTS.soft) -> Vector:
+    """Return W of each residual: W r is the slope of its soft-L1 cost."""
+    return np.asarray(1.0 / np.sqrt(1.0 + (r / scale) ** 2))
+
+
+def by_move(of: Rows, values: Vector, moves: int) -> Vector:
+    """Return sums over the rows that belong to each move, (moves,); `of` as `Likelihood.move_of`."""
+    return np.asarray(np.bincount(of, values, moves + 1)[:-1], dtype=np.float64)

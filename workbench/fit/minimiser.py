@@ -26,7 +26,8 @@ import numpy as np
 from sim.composition import COULOMB, SPRING, STATIC, VISCOUS
 from sim.karnopp import Vector
 from workbench.fit.breaking_off import go_on
-from workbench.fit.likelihood import Groups, Likelihood, Rows, soft
+from workbench.fit.likelihood import Groups, Likelihood, Rows, by_move, soft, soft_weight
+from workbench.fit.onsets import SEARCH as ONSETS
 from workbench.fit.onsets import SHIFT
 
 
@@ -43,8 +44,6 @@ class Effort(NamedTuple):
 class Search:
     """How far and how finely is searched."""
 
-    reach: float = 3.0
-    """Periods about where an onset shows, in which it lies: the first samples in motion are within the noise."""
     step: float = 1e-4
     """Of a coordinate, for its derivatives: a simulation is smooth to a hundredth of that."""
     begin: float = 3.0
@@ -123,7 +122,7 @@ class Ground:
 
     def of_moves(self, values: Vector) -> Vector:
         """Return sums over the residuals of each move, (moves,)."""
-        return np.asarray(np.bincount(self.of, values, self.low.o.size + 1)[:-1], dtype=np.float64)
+        return by_move(self.of, values, self.low.o.size)
 
     def to_rows(self, values: Vector) -> Vector:
         """Return of each residual its move's value, (rows,); 0 of none."""
@@ -189,7 +188,7 @@ def minimise(ground: Ground, begin: Place, effort: Effort) -> Place:
 def _step(ground: Ground, here: Place, r: Vector, slopes: Slopes, damping: float) -> tuple[Place, Place]:
     """Return the damped step inside the bounds, and the square root of the curvature by each variable."""
     J, j = slopes
-    weight = 1.0 / np.sqrt(1.0 + (r / ground.soft) ** 2)
+    weight = soft_weight(r, ground.soft)
     A, g_z = J.T @ (weight[:, None] * J), J.T @ (weight * r)
     D, g_o = ground.of_moves(weight * j**2), ground.of_moves(weight * r * j)
     C = np.array([ground.of_moves(weight * j * column) for column in J.T]).reshape(here.z.size, here.o.size)
@@ -285,7 +284,7 @@ def derivatives(like: Likelihood, z: Vector, onsets_s: Vector) -> Vector:
 def _ground(like: Likelihood, held: tuple[Vector, Vector] | None = None) -> Ground:
     """Return the ground of a likelihood, its coordinates held as of `descend`."""
     low, high = _bounds(like)
-    earliest_s, latest_s = like.run.bounds_s(SEARCH.reach)
+    earliest_s, latest_s = like.run.bounds_s(ONSETS.reach)
 
     def rows(at: Place) -> Vector:
         go_on()

@@ -10,7 +10,7 @@ import numpy as np
 
 from sim.karnopp import Vector
 from workbench.fit.breaking_off import go_on
-from workbench.fit.likelihood import Groups, Likelihood, soft
+from workbench.fit.likelihood import Groups, Likelihood, by_move, soft, soft_weight
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -67,9 +67,9 @@ def with_onsets(like: Likelihood, theta: Vector, rounds: int | None = None) -> t
         go_on()
         slopes = by_onsets(like, theta, onsets_s)
         r = groups.whole
-        weight = 1.0 / np.sqrt(1.0 + (r / like.weights.soft) ** 2)
-        downhill = np.bincount(like.move_of, slopes * weight * r, onsets_s.size + 1)[:-1]
-        bend = np.bincount(like.move_of, slopes**2 * weight, onsets_s.size + 1)[:-1]
+        weight = soft_weight(r, like.weights.soft)
+        downhill = by_move(like.move_of, slopes * weight * r, onsets_s.size)
+        bend = by_move(like.move_of, slopes**2 * weight, onsets_s.size)
         way = -downhill / np.maximum(bend, 1e-12)
         there_s = np.clip(onsets_s + period_s * np.clip(way, -reach, reach), earliest_s, latest_s)
         moved = like.at(theta, there_s)
@@ -85,7 +85,7 @@ def _cost_by_move(like: Likelihood, groups: Groups) -> Vector:
     silent = np.zeros(groups.rests.size)
     broken = groups.break_aways if like.run.hidden else np.zeros(groups.break_aways.size)
     costs = soft(np.concatenate([groups.motion, groups.landings, silent, broken]), like.weights.soft)
-    return np.asarray(np.bincount(like.move_of, costs, len(like.moves) + 1)[:-1], dtype=np.float64)
+    return by_move(like.move_of, costs, len(like.moves))
 
 
 def by_onsets(like: Likelihood, theta: Vector, onsets_s: Vector) -> Vector:

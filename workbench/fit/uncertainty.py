@@ -22,7 +22,7 @@ from scipy.special import stdtrit
 
 from sim.composition import STATIC
 from sim.karnopp import Vector
-from workbench.fit.likelihood import Likelihood
+from workbench.fit.likelihood import Likelihood, soft_weight
 from workbench.fit.minimiser import End
 
 PROBABILITY = 0.975
@@ -77,7 +77,7 @@ def uncertainty(like: Likelihood, end: End) -> Uncertainty:
     """Judge where a search stays; its Jacobian must be there."""
     count = len(like.parameters)
     r = end.groups.whole
-    weight = 1.0 / np.sqrt(1.0 + (r / like.weights.soft) ** 2)
+    weight = soft_weight(r, like.weights.soft)
     bend = weight**3
     J = end.jacobian
     lengths = np.linalg.norm(J, axis=0)

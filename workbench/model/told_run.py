@@ -101,6 +101,9 @@ class ToldRun:
             _part(each, [k for k, move in enumerate(told) if move.segment == number], told, record)
             for number, each in enumerate(self.free._segments)
         ]
+        time_s = record.time_s
+        self._first_onsets_s = np.array([0.5 * (time_s[each.before] + time_s[each.before + 1]) for each in told])
+        self._first_onsets_s.setflags(write=False)
         self._fed = {each.segment.first: self._fed_m(each.segment) for each in self._parts}
 
     def _fed_m(self, segment: Segment) -> Vector:
@@ -114,8 +117,7 @@ class ToldRun:
 
     def first_onsets_s(self) -> Vector:
         """Return the onsets as the samples show them: amid the period after the last sample at rest."""
-        time_s = self.record.time_s
-        return np.array([0.5 * (time_s[each.before] + time_s[each.before + 1]) for each in self.moves])
+        return self._first_onsets_s
 
     def bounds_s(self, periods: float) -> tuple[Vector, Vector]:
         """Return between which times the onsets lie: so many periods about where they show, within their rests.

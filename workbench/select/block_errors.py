@@ -156,8 +156,12 @@ def _on_held_out(fit: Fit, part: Part) -> _Told:
     fits = at_the_noise(fit.cost, fit.count)
     if not (fits and z.size) or at_the_noise(like.cost(groups.whole), like.count):
         return _at(like, part, theta, onsets_s, np.zeros(z.size))
-    begin = min(_open(fit, like, z), key=lambda at: _cost(like, at, root @ (at - z)))
-    end = descend(like, begin, with_onsets(like, like.theta(begin))[0], held=(z, root))
+    if others := _open(fit, like, z):
+        begin = min([z, *others], key=lambda at: _cost(like, at, root @ (at - z)))
+        onsets_s, _ = with_onsets(like, like.theta(begin))
+    else:
+        begin = z
+    end = descend(like, begin, onsets_s, held=(z, root))
     moved = root @ (end.z - z)
     if np.abs(moved).max() > MOST_MOVED:
         return _at(like, part, theta, onsets_s, np.zeros(z.size))
@@ -165,13 +169,14 @@ def _on_held_out(fit: Fit, part: Part) -> _Told:
 
 
 def _open(fit: Fit, like: Likelihood, z: Column) -> list[Column]:
-    """Return coordinates, and others along each that a fit leaves open; static friction is what break-aways say."""
+    """Return other coordinates, along each that a fit leaves open; static friction is what break-aways say."""
     deviation = np.sqrt(np.diag(np.linalg.pinv(fit.known.root.T @ fit.known.root)))
-    found = [z]
+    found = []
     for i, each in enumerate(like.parameters):
         if deviation[i] > LEFT_OPEN and each.index != STATIC:
             reach = MOST_TRIED * min(LEFT_OPEN, deviation[i] / (0.5 * MOST_TRIED))
-            for by in np.linspace(-reach, reach, 2 * MOST_TRIED + 1):
+            ahead = np.linspace(0.0, reach, MOST_TRIED + 1)[1:]
+            for by in (*-ahead[::-1], *ahead):
                 there = z.copy()
                 there[i] = np.clip(z[i] + by, *each.bounds)
                 found.append(there)
