@@ -29,6 +29,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING
 
 from config.codes import Mode
+from config.errors import InputError
 from positioner.cli.parts.clone_only import benchmark
 from positioner.cli.parts.demo_folder import demo_folder, recording_in
 from positioner.cli.parts.output_files import writable, write_json
@@ -205,6 +206,8 @@ def run(arguments: argparse.Namespace) -> int:
     """Run it; exit status 1 when a step ends too far off, or a ratio is identified too badly."""
     writable(arguments.json, "--json")
     if arguments.loop:
+        if arguments.json:
+            raise InputError("--json", "with --loop flow there is none")
         flow = benchmark("flow", "--loop flow")
         status: int = flow.compared(flow.CASES, arguments.out)
         return status

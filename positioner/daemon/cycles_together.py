@@ -14,11 +14,10 @@ import time
 from collections import deque
 from collections.abc import Sequence
 from concurrent.futures import ThreadPoolExecutor
-from contextlib import suppress
 from dataclasses import dataclass
 from heapq import heappop, heappush
 from selectors import EVENT_READ, DefaultSelector
-from threading import Event
+from threading import Event, Lock
 
 from positioner.daemon.backoff import AT_A_TIME
 from positioner.daemon.cycle import Cycle
@@ -63,12 +62,14 @@ class CyclesTogether:
         self._done: deque[int] = deque()
         self._selector = DefaultSelector()
         self._woken, self._wakes = os.pipe()
+        self._waking, self._ended = Lock(), False
         self._failed: BaseException | None = None
 
     def wake(self) -> None:
         """Have the thread look up."""
-        with suppress(OSError):  # it has ended
-            os.write(self._wakes, b" ")
+        with self._waking:
+            if not self._ended:  # else the descriptor is somebody else's by now
+                os.write(self._wakes, b" ")
 
     def run(self) -> None:
         """Cycle until `stop` is set."""
@@ -83,8 +84,10 @@ class CyclesTogether:
                     self._take_answers()
         finally:
             self._selector.close()
-            os.close(self._woken)
-            os.close(self._wakes)
+            with self._waking:
+                self._ended = True
+                os.close(self._woken)
+                os.close(self._wakes)
 
     def _next(self, number: int) -> None:
         turn = self._turns[number]
