@@ -3,8 +3,7 @@
 import argparse
 from pathlib import Path
 
-from positioner.cli.parts.export_arguments import add_export_arguments, read_any
-from positioner.cli.parts.noise_argument import add_noise_argument, noise_said
+from positioner.cli.parts.fit_arguments import add_noise_and_exports, read_with_noise
 from positioner.cli.parts.output_files import writable, write_json
 
 HELP = "simulate a recording and print where the model fails; exit status 1 if it is not adequate"
@@ -17,13 +16,11 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
     parser.add_argument("--valve", required=True, metavar="VALVE.toml", help="a valve file, or a shipped valve's name")
     parser.add_argument("--json", type=Path, metavar="FILE", help="write all numbers as JSON")
     parser.add_argument("--report", type=Path, metavar="FILE.html", help="write a report for a browser")
-    add_noise_argument(parser)
-    add_export_arguments(parser)
+    add_noise_and_exports(parser)
 
 
 def run(arguments: argparse.Namespace) -> int:
     """Compare and print; 0 if the model is adequate, else 1."""
-
     from positioner.cli.parts.model_arguments import read_valve
     from positioner.cli.parts.naming import naming
     from positioner.cli.parts.progress import at_work
@@ -32,7 +29,7 @@ def run(arguments: argparse.Namespace) -> int:
     writable(arguments.json, "--json")
     writable(arguments.report, "--report")
     valve = read_valve(arguments.valve)
-    recording = noise_said(read_any(arguments.recording, arguments, valve.valve.stroke_m), arguments)
+    recording = read_with_noise(arguments.recording, arguments, valve)
     named = {"recording": str(arguments.recording), "valve file": arguments.valve}
     with naming(named), at_work("compare", f"holding {arguments.valve} against {arguments.recording}"):
         compared = compare(recording, valve)

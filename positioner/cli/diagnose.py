@@ -6,10 +6,9 @@ from contextlib import contextmanager
 from pathlib import Path
 from typing import TYPE_CHECKING
 
-from positioner.cli.parts.export_arguments import add_export_arguments, read_any, take_mapping
-from positioner.cli.parts.noise_argument import add_noise_argument, noise_said
+from positioner.cli.parts.export_arguments import take_mapping
+from positioner.cli.parts.fit_arguments import add_noise_and_exports, add_pressure, add_test, read_fitted
 from positioner.cli.parts.output_files import writable, write_json
-from positioner.cli.parts.pressure_argument import add_pressure_argument
 
 if TYPE_CHECKING:
     from config.recording import Recording
@@ -28,12 +27,7 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
     """Declare the command line."""
     parser.add_argument("recordings", type=Path, nargs="+", metavar="REC", help="recordings, CSV or Parquet")
     parser.add_argument("--valve", required=True, metavar="VALVE.toml", help="a valve file, or a shipped valve's name")
-    parser.add_argument(
-        "--test",
-        type=Path,
-        metavar="REC",
-        help="a recording that judges and is not fitted (the last third of the others)",
-    )
+    add_test(parser)
     parser.add_argument(
         "--effects",
         nargs="+",
@@ -63,9 +57,8 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
         help="with -o: add these effects in any case",
     )
     parser.add_argument("--budget-s", type=float, metavar="S", help="time limit; then prints what is known")
-    add_pressure_argument(parser)
-    add_noise_argument(parser)
-    add_export_arguments(parser)
+    add_pressure(parser)
+    add_noise_and_exports(parser)
 
 
 def run(arguments: argparse.Namespace) -> int:
@@ -96,9 +89,7 @@ def run(arguments: argparse.Namespace) -> int:
     valve = read_valve(arguments.valve)
     require_effects(arguments.effects, "--effects")
     require_effects(arguments.add, "--add")
-    stroke_m = valve.valve.stroke_m
-    recordings = [noise_said(read_any(path, arguments, stroke_m), arguments) for path in arguments.recordings]
-    test = noise_said(read_any(arguments.test, arguments, stroke_m), arguments) if arguments.test else None
+    recordings, test = read_fitted(arguments.recordings, arguments, valve)
     named = files_named(arguments.recordings, arguments.test, arguments.valve)
     with naming(named), _end_without_result(), Progress() as progress:
         diagnosis = diagnose(

@@ -4,10 +4,8 @@ import argparse
 from pathlib import Path
 from typing import TYPE_CHECKING
 
-from positioner.cli.parts.export_arguments import add_export_arguments, read_any
-from positioner.cli.parts.noise_argument import add_noise_argument, noise_said
+from positioner.cli.parts.fit_arguments import add_noise_and_exports, add_pressure, add_test, read_fitted
 from positioner.cli.parts.output_files import writable, write_json
-from positioner.cli.parts.pressure_argument import add_pressure_argument
 
 if TYPE_CHECKING:
     from workbench.discover.discovery import Discovery
@@ -22,20 +20,14 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
     """Declare the command line."""
     parser.add_argument("recordings", type=Path, nargs="+", metavar="REC", help="recordings, CSV or Parquet")
     parser.add_argument("--valve", required=True, metavar="VALVE.toml", help="a valve file, or a shipped valve's name")
-    parser.add_argument(
-        "--test",
-        type=Path,
-        metavar="REC",
-        help="a recording that judges and is not fitted (the last third of the others)",
-    )
+    add_test(parser)
     parser.add_argument(
         "-o", "--out", type=Path, metavar="FORM.py", help="write the formula as an effect's file, for `extend`"
     )
     parser.add_argument("--picture", type=Path, metavar="FILE.png", help="draw the formula over its variable")
     parser.add_argument("--json", type=Path, metavar="FILE", help="write all numbers as JSON")
-    add_pressure_argument(parser)
-    add_noise_argument(parser)
-    add_export_arguments(parser)
+    add_pressure(parser)
+    add_noise_and_exports(parser)
 
 
 def run(arguments: argparse.Namespace) -> int:
@@ -53,9 +45,7 @@ def run(arguments: argparse.Namespace) -> int:
     if arguments.picture is not None:
         needed("matplotlib.pyplot", "--picture")
     valve = read_valve(arguments.valve)
-    stroke_m = valve.valve.stroke_m
-    recordings = [noise_said(read_any(path, arguments, stroke_m), arguments) for path in arguments.recordings]
-    test = noise_said(read_any(arguments.test, arguments, stroke_m), arguments) if arguments.test else None
+    recordings, test = read_fitted(arguments.recordings, arguments, valve)
     named = files_named(arguments.recordings, arguments.test, arguments.valve)
     with naming(named), at_work("discover") as progress:
         found = discover(

@@ -6,8 +6,9 @@ from pathlib import Path
 from typing import TYPE_CHECKING
 
 from positioner.cli.parts.config_argument import add_config, config_file
+from positioner.cli.parts.daemon_address import add_tls
+from positioner.cli.parts.fit_arguments import add_pressure, add_test
 from positioner.cli.parts.output_files import make_folder, write_json
-from positioner.cli.parts.pressure_argument import add_pressure_argument
 
 if TYPE_CHECKING:
     from config.daemon_file import DaemonFile
@@ -28,24 +29,13 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
     add_config(parser, text="the running daemon's file, with [recorder]")
     parser.add_argument("--rec", type=Path, nargs="+", required=True, metavar="REC", help="recordings, CSV or Parquet")
     parser.add_argument("--valve", required=True, metavar="VALVE.toml", help="a valve file, or a shipped valve's name")
-    parser.add_argument(
-        "--test",
-        type=Path,
-        metavar="REC",
-        help="a recording that judges and is not fitted (the last third of the others)",
-    )
+    add_test(parser)
     parser.add_argument("--effects", nargs="+", metavar="NAME", help="effects to try (all known effects)")
-    add_pressure_argument(parser)
+    add_pressure(parser)
     parser.add_argument("--budget", type=int, default=60, metavar="MOVES", help="largest number of moves (60)")
     parser.add_argument("--out", type=Path, default=Path("discriminated"), help="folder for recordings and verdict")
     parser.add_argument("--name", help="name of the valve, where the file has several")
-    parser.add_argument(
-        "--tls",
-        nargs=3,
-        type=Path,
-        metavar=("AUTHORITY.pem", "CERTIFICATE.pem", "KEY"),
-        help="use Modbus/TCP Security, with a certificate of role engineer",
-    )
+    add_tls(parser, ", with a certificate of role engineer")
     parser.add_argument("--seed", type=int, default=0, help="seed of the experiments (0)")
 
 

@@ -3,10 +3,8 @@
 import argparse
 from pathlib import Path
 
-from positioner.cli.parts.export_arguments import add_export_arguments, read_any
-from positioner.cli.parts.noise_argument import add_noise_argument, noise_said
+from positioner.cli.parts.fit_arguments import add_noise_and_exports, add_pressure, add_test, read_fitted
 from positioner.cli.parts.output_files import writable, write_json
-from positioner.cli.parts.pressure_argument import add_pressure_argument
 
 HELP = "add effects to a valve file, fit it, and print the error before and after"
 EXAMPLE = "positioner extend seed --effect backlash --fit rec.csv -o new.toml"
@@ -23,18 +21,12 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
         help="effects to add, or .py files of your own (none: fit the valve as it is)",
     )
     parser.add_argument("--fit", type=Path, nargs="+", required=True, metavar="REC", help="one or several recordings")
-    parser.add_argument(
-        "--test",
-        type=Path,
-        metavar="REC",
-        help="a recording that judges and is not fitted (the last third of the others)",
-    )
+    add_test(parser)
     parser.add_argument("-o", "--out", type=Path, required=True, metavar="NEW.toml")
     parser.add_argument("--json", type=Path, metavar="FILE", help="write all numbers as JSON")
     parser.add_argument("--report", type=Path, metavar="FILE.html", help="write the journal for a browser")
-    add_pressure_argument(parser)
-    add_noise_argument(parser)
-    add_export_arguments(parser)
+    add_pressure(parser)
+    add_noise_and_exports(parser)
 
 
 def run(arguments: argparse.Namespace) -> int:
@@ -59,8 +51,7 @@ def run(arguments: argparse.Namespace) -> int:
     path = find_valve(arguments.valve)
     valve = read_valve(arguments.valve)
     require_effects(arguments.effect, "--effect")
-    recordings = [noise_said(read_any(each, arguments, valve.valve.stroke_m), arguments) for each in arguments.fit]
-    test = noise_said(read_any(arguments.test, arguments, valve.valve.stroke_m), arguments) if arguments.test else None
+    recordings, test = read_fitted(arguments.fit, arguments, valve)
     Journal.beside(path)  # what is none is refused before the work begins
     named = files_named(arguments.fit, arguments.test, arguments.valve)
     with naming(named), at_work("extend") as progress:

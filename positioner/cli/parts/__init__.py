@@ -9,7 +9,7 @@ A command imports from here what it needs when it runs.
     valve_test, own_valve                       what tests on the valve share; a valve on a cycle of the command's own
     hidden_demo                                 `demo --hidden`: an effect found in the daemon's own recording
     csv_series, export_arguments, naming        series, historian's exports, and names of files in messages
-    noise_argument, pressure_argument           `--noise-m`; `--from-pressure`
+    fit_arguments                               what judges, noise, measured pressure; the recordings read so
     loop_arguments                              the columns of a control loop
     model_arguments                             a valve file and effects, checked before the work begins
     diagnose_forces, next_step                  `diagnose` on a bench's recording; what to type after a diagnosis

@@ -23,13 +23,13 @@ def add_connection(parser: argparse.ArgumentParser) -> None:
     parser.add_argument("--host", help="the daemon's host (127.0.0.1)")
     parser.add_argument("--port", type=_whole("a port", 1, 65535), help="its supervisory port (5502)")
     parser.add_argument("--unit", type=_whole("a Modbus unit", 0, 255), help="the valve's Modbus unit (1)")
-    parser.add_argument(
-        "--tls",
-        nargs=3,
-        type=Path,
-        metavar=("AUTHORITY.pem", "CERTIFICATE.pem", "KEY"),
-        help="use Modbus/TCP Security: certificate of the authority, certificate of this client, and its key",
-    )
+    add_tls(parser, ": certificate of the authority, certificate of this client, and its key")
+
+
+def add_tls(parser: argparse.ArgumentParser, text: str) -> None:
+    """Declare what a secured connection is made with."""
+    files = ("AUTHORITY.pem", "CERTIFICATE.pem", "KEY")
+    parser.add_argument("--tls", nargs=3, type=Path, metavar=files, help=f"use Modbus/TCP Security{text}")
 
 
 def _whole(what: str, least: int, most: int) -> Callable[[str], int]:

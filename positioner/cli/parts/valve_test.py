@@ -7,6 +7,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 from positioner.cli.parts.config_argument import add_config, config_files
+from positioner.cli.parts.daemon_address import add_tls
 from positioner.cli.parts.output_files import writable, write_json
 
 if TYPE_CHECKING:
@@ -45,13 +46,7 @@ def add_test_arguments(parser: argparse.ArgumentParser, *, recordings: bool = Tr
     parser.add_argument("--against", choices=KINDS, help="compare with the newest result of this name")
     parser.add_argument("--json", type=Path, metavar="FILE", help="write verdict and figures as JSON")
     parser.add_argument("--picture", type=Path, metavar="FILE", help="draw it: .png, .svg or .pdf")
-    parser.add_argument(
-        "--tls",
-        nargs=3,
-        type=Path,
-        metavar=("AUTHORITY.pem", "CERTIFICATE.pem", "KEY"),
-        help="use Modbus/TCP Security, with a certificate of role engineer",
-    )
+    add_tls(parser, ", with a certificate of role engineer")
 
 
 def checked(arguments: argparse.Namespace) -> "DaemonFile | None":
