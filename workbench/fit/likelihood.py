@@ -228,7 +228,7 @@ class Likelihood:
         most = self.weights.wild
         rows = self.layout
         e = self.off_m(path, theta) / self.sigma_m
-        e = np.clip(np.nan_to_num(e, nan=most, posinf=most, neginf=-most), -most, most)
+        e = np.maximum(np.fmin(e, most), -most)  # of no number and another fmin takes the other
         sums = np.add.reduceat(e[rows.resting], rows.starts) if rows.starts.size else np.empty(0)
         mean = np.bincount(rows.rest_of, sums) / rows.per_rest
         blocks = (sums / rows.count - mean[rows.rest_of]) * np.sqrt(rows.count)
@@ -240,10 +240,14 @@ class Likelihood:
 
     def break_rows(self, path: ToldPath, theta: Vector) -> Vector:
         """Return the residuals of the second factor."""
-        F_s, bears, breaks = float(theta[STATIC]), path.bears_n[self.broken], path.breaks_n[self.broken]
+        return self.rows_of_static(path, theta[STATIC : STATIC + 1])[0]
+
+    def rows_of_static(self, path: ToldPath, static_n: Vector) -> Vector:
+        """Return the residuals of the second factor with each of some static frictions, N, (frictions, rows)."""
+        F_s, bears, breaks = static_n[:, np.newaxis], path.bears_n[self.broken], path.breaks_n[self.broken]
         breaks = np.where(breaks > 0.0, breaks, np.inf)  # it slides on where the record rests: nothing breaks loose
-        off = np.maximum(np.maximum(bears - F_s, F_s - breaks), 0.0) / self.load_n
-        return np.clip(np.nan_to_num(off, nan=self.weights.wild), 0.0, self.weights.wild)
+        off = np.maximum(bears - F_s, F_s - breaks) / self.load_n
+        return np.asarray(np.maximum(np.fmin(off, self.weights.wild), 0.0))
 
 
 def off_by(simulated_m: Vector, measured_m: Vector, quantum_m: float, tolerance: float) -> Vector:
@@ -268,9 +272,11 @@ def _guesses(composition: Composition) -> list[str]:
 def with_static(like: Likelihood, theta: Vector, path: ToldPath) -> Vector:
     """Return a parameter vector with the static friction that its path's break-aways like best, (parameters,)."""
     ends_n = np.concatenate([path.bears_n[like.broken], path.breaks_n[like.broken]])
-    ends_n = np.unique(ends_n[np.isfinite(ends_n) & (ends_n > theta[COULOMB])])
-    trials = [theta] + [np.where(np.arange(theta.size) == STATIC, each, theta) for each in ends_n]
-    return min(trials, key=lambda there: like.cost(like.break_rows(path, there)))
+    tried_n = np.append(theta[STATIC], np.unique(ends_n[np.isfinite(ends_n) & (ends_n > theta[COULOMB])]))
+    costs = soft(like.rows_of_static(path, tried_n), like.weights.soft).sum(axis=1)
+    there = theta.copy()
+    there[STATIC] = tried_n[int(np.argmin(costs))]
+    return there
 
 
 def soft(r: Vector, scale: float = WEIGHTS.soft) -> Vector:

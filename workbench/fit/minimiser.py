@@ -298,11 +298,11 @@ def _ground(like: Likelihood, held: tuple[Vector, Vector] | None = None) -> Grou
 
 
 def _periods(like: Likelihood, onsets_s: Vector) -> Vector:
-    return np.asarray((onsets_s - like.run.first_onsets_s()) / like.record.period_s)
+    return np.asarray((onsets_s - like.run.first_onsets_s()) / like.run.period_s)
 
 
 def _seconds(like: Likelihood, o: Vector) -> Vector:
-    return np.asarray(like.run.first_onsets_s() + like.record.period_s * o)
+    return np.asarray(like.run.first_onsets_s() + like.run.period_s * o)
 
 
 def _bounds(like: Likelihood) -> tuple[Vector, Vector]:

@@ -31,6 +31,8 @@ class OnsetSearch:
     """Periods that an onset moves at most in a round."""
     unseen_step: float = 10.0
     """The same where the stem may move before it is seen to: it has left by as much as its play takes."""
+    left: float = 0.5
+    """Nats that a round gains at least, of all onsets together: the ends of searches are one within a nat."""
     shorter: float = 0.3
     """Factor on that where a step led higher."""
 
@@ -46,7 +48,7 @@ def with_onsets(like: Likelihood, theta: Vector, rounds: int | None = None) -> t
     Each onset acts until the next: all are found at once, each by its own parabola, and kept where they help.
     """
     earliest_s, latest_s = like.run.bounds_s(SEARCH.reach)
-    period_s, onsets_s = like.record.period_s, like.run.first_onsets_s()
+    period_s, onsets_s = like.run.period_s, like.run.first_onsets_s()
     open_ = np.ones(onsets_s.size, dtype=np.bool_)
     for _ in range(SEARCH.tries):
         tried = [
@@ -63,7 +65,7 @@ def with_onsets(like: Likelihood, theta: Vector, rounds: int | None = None) -> t
             break
     groups = like.at(theta, onsets_s)
     reach = np.full(onsets_s.size, SEARCH.unseen_step if like.run.hidden else SEARCH.first_step)
-    for _ in range((rounds or SEARCH.rounds) if onsets_s.size else 0):
+    for number in range((rounds or SEARCH.rounds) if onsets_s.size else 0):
         go_on()
         slopes = by_onsets(like, theta, onsets_s)
         r = groups.whole
@@ -76,7 +78,10 @@ def with_onsets(like: Likelihood, theta: Vector, rounds: int | None = None) -> t
         better = _cost_by_move(like, moved) < _cost_by_move(like, groups)
         onsets_s = np.where(better, there_s, onsets_s)
         reach = np.where(better, reach, SEARCH.shorter * reach)
-        groups = like.at(theta, onsets_s)
+        before, groups = groups, like.at(theta, onsets_s)
+        gained = like.cost(before.whole) - like.cost(groups.whole)
+        if number and gained < SEARCH.left and reach.max() <= SEARCH.first_step:
+            break
     return onsets_s, groups
 
 
@@ -91,5 +96,5 @@ def _cost_by_move(like: Likelihood, groups: Groups) -> Vector:
 def by_onsets(like: Likelihood, theta: Vector, onsets_s: Vector) -> Vector:
     """Return the derivative of each residual by the onset of its move, in periods, (rows,); 0 of what has none."""
     here = like.at(theta, onsets_s).whole
-    there = like.at(theta, onsets_s + SHIFT * like.record.period_s).whole
+    there = like.at(theta, onsets_s + SHIFT * like.run.period_s).whole
     return np.where(like.move_of < len(like.moves), (there - here) / SHIFT, 0.0)

@@ -90,7 +90,7 @@ class ToldRun:
         by: Sampling = DYNAMIC,
         from_pressure: bool = False,
     ) -> None:
-        self.record, self.moves = record, told
+        self.record, self.moves, self.period_s = record, told, record.period_s
         seen = record if by.held else _acting_before(record)
         self.free = FreeRun(composition, seen, from_pressure=from_pressure, by=DYNAMIC)
         self._composition = self.free._composition
@@ -124,7 +124,7 @@ class ToldRun:
 
         A stem whose sensor may stay while it moves has left at any time of the rest.
         """
-        first, period_s, time_s = self.first_onsets_s(), self.record.period_s, self.record.time_s
+        first, period_s, time_s = self.first_onsets_s(), self.period_s, self.record.time_s
         earliest = np.array([time_s[each.rested_from] for each in self.moves])
         latest = np.array([time_s[max(each.after - 1, each.before)] for each in self.moves])
         low = earliest if self.hidden else np.maximum(first - periods * period_s, earliest)
@@ -168,7 +168,8 @@ class ToldRun:
         np.add.at(change, begins, -1.0)
         np.add.at(change, np.maximum(part.overs, begins), 1.0)
         held = np.where(np.cumsum(change[:-1]) < 0.0, 0.0, 1.0)
-        held[at] = np.clip((onset_s - part.starts_s[at]) / np.diff(part.starts_s)[at], 0.0, 1.0)
+        begin_s, end_s = part.starts_s[at], part.starts_s[at + 1]
+        held[at] = np.clip((onset_s - begin_s) / (end_s - begin_s), 0.0, 1.0)
         return held
 
 
