@@ -14,6 +14,9 @@ effects make of static friction F_s at a place and time,
 It was at least L at every sample of a rest, and at most L where the stem broke loose. A stem at rest may be anywhere
 within `blur` of where it is held, m: L is the least there, lest a stop, which gives way by micrometres, be a load.
 
+Where an effect moves the stuck stem (`creeps`), what is seen to move has not yet broken loose: it does so by itself, at
+F_s by the law of `sim.karnopp`, and no onset tells a load.
+
 What acts on the stem's measured position, a positioner, is fed that: the loop is cut, and a pressure without feedback
 is smooth in every parameter.
 
@@ -101,6 +104,7 @@ def carried(
     longest_step: float,
     tolerance: float,
     held: bool,
+    creeps: bool,
     fast: float,
     seen: float,
     seen_rate: float,
@@ -133,7 +137,7 @@ def carried(
             rested = mode == STUCK
             if rested or abs(x - place) <= blur:
                 most = max(most, load(valve, Stem(t0, x, 0.0, p0), blur, q, z))
-            law, drive = free if fast > 0.0 else valve, Drive(t0, p0, (p - p0) / s)
+            law, drive = free if creeps or fast > 0.0 else valve, Drive(t0, p0, (p - p0) / s)
             x, v, mode, sigma, indicated = follow(law, drive, s, x, v, p, mode, sigma, tolerance, held, q, z)
             if mode == STUCK:
                 fast = 0.0
@@ -165,6 +169,7 @@ def tell(
     longest_step: float,
     tolerance: float,
     blur: float,
+    creeps: float,
     indicated: Vector,
     loads: Vector,
 ) -> None:
@@ -173,6 +178,8 @@ def tell(
     Seen is what a pressure path that obeys the stem is fed, m, (periods + 1,); NaN: the simulated stem.
     Shares, (periods,), from 0, loose throughout, to 1, held throughout. Loads, (2, periods): L, N, of the stem held in
     a period, and where it was let go in it; 0 where it was not.
+
+    Creeps, 1 or 0: whether a stem that is let go yet breaks loose by itself.
 
     A stem that stays held under the same command is carried at once to its end, if what it shows has come to rest: L is
     convex between, and greatest at one of the ends.
@@ -195,7 +202,21 @@ def tell(
                 for j in range(k + 1, end):
                     rests_s += periods[j]
             here = carried(
-                *(valve, now, command, rests_s, longest_step, tolerance, True, fast, fed, rate, blur, FAR_M),
+                *(
+                    valve,
+                    now,
+                    command,
+                    rests_s,
+                    longest_step,
+                    tolerance,
+                    True,
+                    creeps > 0.0,
+                    fast,
+                    fed,
+                    rate,
+                    blur,
+                    FAR_M,
+                ),
                 *(theta, state),
             )
             now, fast = here.now, here.fast
@@ -206,7 +227,21 @@ def tell(
             still = abs(now.x - place) <= blur
             fed += rate * rests_s
             here = carried(
-                *(valve, now, command, slides_s, longest_step, tolerance, False, fast, fed, rate, blur, place),
+                *(
+                    valve,
+                    now,
+                    command,
+                    slides_s,
+                    longest_step,
+                    tolerance,
+                    False,
+                    creeps > 0.0,
+                    fast,
+                    fed,
+                    rate,
+                    blur,
+                    place,
+                ),
                 *(theta, state),
             )
             now, fast = here.now, here.fast

@@ -17,6 +17,7 @@ from workbench.model.free_run import FreeRun
 from workbench.model.told_run import ToldRun, told_moves
 
 LAG = with_effect(SEED, "ip_lag", time_constant_s=0.15)
+YIELDS = with_effect(SEED, "presliding", stiffness_n_per_m=1.5e6)
 
 
 def steps() -> Column:
@@ -38,7 +39,7 @@ def likelihood(file: ValveFile, record: Record) -> Likelihood:
     return problem(record, file.valve).likelihood(Composition.from_file(file))
 
 
-@pytest.mark.parametrize("file", [SEED, LAG, with_effect(SEED, "preload", force_n=300.0)])
+@pytest.mark.parametrize("file", [SEED, LAG, YIELDS, with_effect(SEED, "preload", force_n=300.0)])
 def test_told_when_it_moves_the_true_valve_leaves_the_noise(file: ValveFile) -> None:
     record = ready(recording(file))
     like = likelihood(file, record)
