@@ -240,7 +240,7 @@ class Likelihood:
 
     def break_rows(self, path: ToldPath, theta: Vector) -> Vector:
         """Return the residuals of the second factor."""
-        return self.rows_of_static(path, theta[STATIC : STATIC + 1])[0]
+        return np.asarray(self.rows_of_static(path, theta[STATIC : STATIC + 1])[0])
 
     def rows_of_static(self, path: ToldPath, static_n: Vector) -> Vector:
         """Return the residuals of the second factor with each of some static frictions, N, (frictions, rows)."""
