@@ -58,20 +58,20 @@ class DataSheet:
             inside = value is None or ((value >= 1.0 if key == "breakaway_ratio" else value > 0.0) and value <= most)
             if not inside:
                 raise InputError(key, f"must be above {least:g}, at most {most:g}, it is {value:g}")
-        closed, open_ = self.range_bar
-        if not 0.0 <= closed < open_ <= HIGHEST_BAR:
+        first, last = self.range_bar
+        if not 0.0 <= first < last <= HIGHEST_BAR:
             raise InputError(
                 "range_bar",
                 f"must be two gauge pressures, the lower first, up to {HIGHEST_BAR:g} bar (3 to 15 psi are 0.207 to "
-                f"1.034); it is {closed:g} {open_:g}",
+                f"1.034); it is {first:g} {last:g}",
             )
 
 
 def from_data_sheet(sheet: DataSheet) -> tuple[ValveFile, list[str], list[str]]:
     """Return the valve, what it says from the data sheet, and what was assumed."""
     area_m2, stroke_m = 1e-4 * sheet.area_cm2, 1e-3 * sheet.stroke_mm
-    closed_pa, open_pa = (1e5 * each for each in sheet.range_bar)
-    span_n = (open_pa - closed_pa) * area_m2
+    first_pa, last_pa = (1e5 * each for each in sheet.range_bar)
+    span_n = (last_pa - first_pa) * area_m2
     spring = span_n / stroke_m
     percent = sheet.friction_percent or FRICTION_PERCENT
     ratio = sheet.breakaway_ratio or BREAKAWAY_RATIO
@@ -89,7 +89,7 @@ def from_data_sheet(sheet: DataSheet) -> tuple[ValveFile, list[str], list[str]]:
         deadzone_ratio=DEADZONE,
         stroke_m=_round_digits(stroke_m),
     )
-    preload = EffectTable.model_validate({"name": "preload", "force_n": _round_digits(closed_pa * area_m2)})
+    preload = EffectTable.model_validate({"name": "preload", "force_n": _round_digits(first_pa * area_m2)})
     stops = EffectTable.model_validate(
         {
             "name": "end_stop",
@@ -101,7 +101,7 @@ def from_data_sheet(sheet: DataSheet) -> tuple[ValveFile, list[str], list[str]]:
     )
     given = [
         f"spring {valve.spring_n_per_m:g} N/m: {span_n:.6g} N over {sheet.stroke_mm:g} mm",
-        f"preload {closed_pa * area_m2:.6g} N: {sheet.range_bar[0]:g} bar on {sheet.area_cm2:g} cm2",
+        f"preload {first_pa * area_m2:.6g} N: {sheet.range_bar[0]:g} bar on {sheet.area_cm2:g} cm2",
         f"stops at 0 and {sheet.stroke_mm:g} mm",
     ]
     friction = f"sliding friction {valve.coulomb_n:g} N: {percent:g} % of the range between opening and closing"
@@ -115,7 +115,7 @@ def from_data_sheet(sheet: DataSheet) -> tuple[ValveFile, list[str], list[str]]:
         f"Stribeck velocity {STRIBECK_M_PER_S:g} m/s; stops {STOP_STIFFNESS:g} times as stiff as the spring",
     ]
     given += [each for each in (friction, breakaway, mass) if not any(one.startswith(each) for one in assumed)]
-    return ValveFile(valve=valve, effect=(preload, stops) if closed_pa > 0.0 else (stops,)), given, assumed
+    return ValveFile(valve=valve, effect=(preload, stops) if first_pa > 0.0 else (stops,)), given, assumed
 
 
 def _within(value: float, allowed: tuple[float, float]) -> float:

@@ -20,7 +20,7 @@ It defines
 and a function for its place. The places and what each returns:
 
     pressure   the pressure that leaves it, Pa, from the pressure u that enters it
-    force      an extra force on the stem, N, positive in the opening direction
+    force      an extra force on the stem, N, positive in the direction in which pressure drives it, called opening
     friction   the levels (F_c, F_s), N, from those that enter it; direction is the sign of (impending) motion
     motion     the stem's (x, v) at the end of a step; F_e is the external force, N, stiffness its -dF_e/dx, N/m
     sensor     the position that leaves it, m, from the position y that enters it

@@ -20,6 +20,7 @@ from config.codes import (
     Sampling,
     ServiceState,
     State,
+    cause_text,
 )
 from config.quantities import DeviceStatus
 from config.registers import BY_NAME, ESTIMATED
@@ -42,6 +43,13 @@ CODES: dict[str, type[Code]] = {
     "event_class": Ne107Status,
 }
 """The code that each register of one serves."""
+
+CAUSE_BITS = {"ne107_causes": 0, "ne107_causes_high": 16} | dict.fromkeys(
+    ("alarms_active", "alarms_unacknowledged", "alarms_shelved"), 0
+)
+"""Registers whose bit n - 1 is a cause of `ne107_cause`: n less the cause."""
+SWITCHES = {"eta_": ("on", "off"), "_valid": ("not valid", "valid")}
+"""What 0 and 1 mean, of registers by a part of their name."""
 
 IDENTIFIED = (*ESTIMATED, "breakaway", "static_slope", "static_up", "static_down")
 """All that has a value, a standard deviation and a reason."""
@@ -111,14 +119,20 @@ def in_words(register: str, value: float, values: Mapping[str, float]) -> str:
 
     >>> in_words("mode", 2, {}), in_words("b_reason", 0, {}), in_words("position", 0.5, {})
     ('automatic', 'valid', '')
+    >>> in_words("eta_1", 0, {}), in_words("ne107_causes_high", 1, {}), in_words("event_cause", 2, {"event": 7})
+    ('on', 'cycles or replies too slow', 'automatic')
     """
-    if register in CODES:
-        return code_text(register, value)
+    if register in CODES or register.endswith("_reason"):
+        return code_text(register if register in CODES else "refusal", value)
+    if register in CAUSE_BITS:
+        return ", ".join(ne107_causes(int(value) << CAUSE_BITS[register])) or "none"
     if register == "device_status":
         return device_status(value, values.get("fault", Fault.NONE))
-    if register.endswith("_reason"):
-        return code_text("refusal", value)
-    return ""
+    if register == "event_cause":
+        kind = int(values.get("event", EventKind.NONE))
+        return cause_text(EventKind(kind), int(value)) if kind in list(EventKind) else ""
+    switch = next((words for part, words in SWITCHES.items() if part in register), ("", ""))
+    return switch[bool(value)]
 
 
 def estimates_in_words(values: Mapping[str, float]) -> Iterator[EstimateInWords]:

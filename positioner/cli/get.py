@@ -34,6 +34,7 @@ def run(arguments: argparse.Namespace) -> int:
     width = max(map(len, names)) if len(names) > 1 else 0
     for name, value in values.items():
         unit = BY_NAME[name].unit if width and BY_NAME[name].unit != "1" else ""
-        parts = (f"{name:{width}} " if width else "", f"{value:.9g}", unit, in_words(name, value, values))
+        number = f"{value:.9g}" if BY_NAME[name].type == "float32" else f"{value:.0f}"
+        parts = (f"{name:{width}} " if width else "", number, unit, in_words(name, value, values))
         print(" ".join(each for each in parts if each))
     return 0

@@ -14,8 +14,8 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
         "--range-bar",
         type=float,
         nargs=2,
-        metavar=("CLOSED", "OPEN"),
-        help="bench range: gauge pressures at both ends of the travel",
+        metavar=("FIRST", "LAST"),
+        help="bench range: gauge pressures at which the stem leaves one end and reaches the other, whatever the action",
     )
     parser.add_argument("--stroke-mm", type=float, metavar="MM", help="rated travel")
     parser.add_argument(

@@ -29,6 +29,14 @@ def test_a_stem_that_does_not_move_rests() -> None:
     assert first_rest(np.full(100, 0.05)) == pytest.approx(7, abs=2)
 
 
+@pytest.mark.parametrize("pressure_pa", [32011.08902975449, 1e5 / 3, 3e4 + 1e-7, 0.0])
+def test_a_pressure_that_does_not_change_rests_whatever_the_last_bit_of_its_means(pressure_pa: float) -> None:
+    count = 5000
+    rounded_pa = pressure_pa * (1.0 + 1e-12 * (np.arange(count) > count // 2))
+    for each in (np.full(count, pressure_pa), rounded_pa):
+        assert first_rest(np.full(count, 0.0609538902568913), each) == pytest.approx(7, abs=2)
+
+
 @pytest.mark.parametrize("time_constant_s", [0.005, 0.05, 0.3])
 def test_a_creep_is_waited_for(time_constant_s: float) -> None:
     time_s = np.arange(8000) * PERIOD_S

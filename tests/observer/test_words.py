@@ -7,7 +7,15 @@ import pytest
 from config.codes import Code, ExperimentState, Fault, Mode, State, listed
 from config.registers import BY_NAME, REGISTERS
 from northbound.observer.permissives import IDENTIFY_READS, identify_permissives
-from northbound.observer.words import CODES, IDENTIFIED, code_text, estimates_in_words, ne107_causes
+from northbound.observer.words import (
+    CAUSE_BITS,
+    CODES,
+    IDENTIFIED,
+    code_text,
+    estimates_in_words,
+    in_words,
+    ne107_causes,
+)
 
 READY = {
     "mode": Mode.AUTOMATIC,
@@ -32,6 +40,17 @@ def test_every_register_that_lists_codes_is_said_in_words() -> None:
     }
     assert len(of) >= 9
     assert of.items() <= CODES.items()
+
+
+def test_every_bit_and_switch_is_said_in_words() -> None:
+    """Whatever a table's text numbers by bits, or says by 0 and 1, nobody has to look up."""
+    bits = {each.name for each in REGISTERS if "is cause n" in each.text}
+    assert bits == set(CAUSE_BITS)
+    assert len(bits) == 5
+    for name, less in CAUSE_BITS.items():
+        assert in_words(name, 1 << 4, {}) == code_text("ne107_cause", 5 + less)
+    for each in (each.name for each in REGISTERS if each.text.startswith(("0 switches", "1 when the estimate"))):
+        assert in_words(each, 0, {}) != in_words(each, 1, {}) != ""
 
 
 def test_causes_are_all_named() -> None:

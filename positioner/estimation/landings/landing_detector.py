@@ -260,7 +260,7 @@ class LandingDetector:
 
     def _change_level(self, time_s: float, command_pa: float, pressure_pa: float) -> None:
         """Begin to wait for what a change of the command does; the stem starts from its rest, or from where it is."""
-        step_pa = abs(command_pa - self._level_pa)
+        step_pa = 0.0 if isnan(self._level_pa) else abs(command_pa - self._level_pa)
         # Of a command that changes with each sample there is no arrival.
         if time_s - self._level_s > ONE_SAMPLE * self._interval_s:
             self._arrival.restart(time_s, pressure_pa, self._level_pa, command_pa, at_rest=self.rest is not None)

@@ -50,6 +50,8 @@ SCATTER, AGREEMENT = 5.0, 4.0
 """Standard deviations: of a sample, of the difference of two means."""
 PRESSURE_LEFT = 0.01
 """Share of the range of the measured pressure by which its quarters may differ."""
+SAME_PRESSURE = 1e-6
+"""Of the measured pressure: a smaller difference is that of rounding, and moves no stem."""
 POOLED = 0.2
 """Weight of a rest in the variance of the noise."""
 NOISIER, FEW = 2.0, 32
@@ -188,7 +190,8 @@ class RestWindow:
         mean_m, late_pa = _mean(late_m), _mean(pressure_pa[half:])
         # NaN where some are not measured.
         range_pa = float(np.maximum.reduce(pressure_pa)) - float(np.minimum.reduce(pressure_pa))
-        if isfinite(range_pa) and not _flat(pressure_pa[half:], PRESSURE_LEFT * range_pa):
+        least_pa = max(PRESSURE_LEFT * range_pa, SAME_PRESSURE * abs(late_pa))
+        if isfinite(range_pa) and not _flat(pressure_pa[half:], least_pa):
             return None
         if _farthest(late_m - mean_m) > within_m or not _flat(late_m, 0.5 * max(self._tolerance_m, self.quantum_m)):
             creeping = self._creeping(time_s, position_m, half, noise_m, within_m, no_answer_m_per_s)
