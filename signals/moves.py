@@ -285,18 +285,17 @@ def _fitted(x: Array, noise_m: float, runs: list[Run]) -> list[Move]:
     bounds = [0, *[row for run in runs for row in run], x.size - 1]
     rests = [(bounds[i], bounds[i + 1]) for i in range(0, len(bounds), 2)]
     within = AT_REST * noise_m
+    known = [(begin, end, float(np.median(x[begin : end + 1]))) for begin, end in rests]
     found = []
-    for (before, after), (first, end) in zip(pairwise(rests), runs, strict=True):
+    for ((begins, _, before), (_, ends, after)), (first, end) in zip(pairwise(known), runs, strict=True):
         row, last = first, end
-        level = float(np.median(x[before[0] : before[1] + 1]))
-        while row > before[0] and abs(x[row] - level) > within:
+        while row > begins and abs(x[row] - before) > within:
             row -= 1
-        while row + 1 < end and abs(x[row + 1] - level) <= within:
+        while row + 1 < end and abs(x[row + 1] - before) <= within:
             row += 1
-        level = float(np.median(x[after[0] : after[1] + 1]))
-        while last < after[1] and abs(x[last] - level) > within:
+        while last < ends and abs(x[last] - after) > within:
             last += 1
-        while last - 1 > row and abs(x[last - 1] - level) <= within:
+        while last - 1 > row and abs(x[last - 1] - after) <= within:
             last -= 1
         if _covers(x, noise_m, (row, last)):
             found.append(Move(-1 if first == 0 else row, x.size if end == x.size - 1 else last))

@@ -131,12 +131,10 @@ class Term:
         at = [given[each].tolist() for each in named if each != "q"]
         readings = list(zip(*at, strict=True)) or [()] * len(rows)
 
-        def of(strength: float) -> Column:
-            q = law.parameters(**dict(self.shape), **{self.strength: strength})
-            found = [law.function(*each, q) for each in readings]
-            return np.array([each[0] for each in found] if self.is_friction else found)
-
-        return (of(self.unit * SMALL) - of(0.0)) / SMALL
+        q = law.parameters(**dict(self.shape), **{self.strength: self.unit * SMALL})
+        found = [law.function(*each, q) for each in readings]
+        # Without strength it vanishes: no force, and the friction that it was given.
+        return (np.array([each[0] for each in found]) - one if self.is_friction else np.array(found)) / SMALL
 
 
 @dataclass(frozen=True, slots=True)
@@ -218,17 +216,19 @@ class Balance:
                 shapes[key] = tuple(unit * each for each in tried) or declared.starts_for(self.valve)[:1]
         found = [Term(effect, strength, 1.0, each) for each in _products(shapes)]
         if effect.parameters[strength].least < 0.0:
-            one, other = found[0].values(self.rows), replace(found[0], unit=-1.0).values(self.rows)
-            if not np.allclose(one, -other):
+            if not np.allclose(self._values_of(found[0]), -self._values_of(replace(found[0], unit=-1.0))):
                 found = [replace(each, unit=unit, of_sign=True) for each in found for unit in (1.0, -1.0)]
         return found
 
     def _column(self, term: Term, z: Column) -> Column:
         """Return a term as it stands in the balance, (rows,)."""
+        return self._values_of(term) * z if term.is_friction else -self._values_of(term)
+
+    def _values_of(self, term: Term) -> Column:
         key = term.name, term.unit, term.shape
         if key not in self._values:
             self._values[key] = term.values(self.rows)
-        return self._values[key] * z if term.is_friction else -self._values[key]
+        return self._values[key]
 
     def friction_state(self, yield_m: float | None) -> Column:
         """Return z, (rows,): the direction, or that of a packing that yields over so many metres before it slips."""
