@@ -10,7 +10,7 @@ from workbench.data.stillness import eventful
 from workbench.data.stretches import FITTED_WORK, PARTS, informative
 
 NOISE_M, HELD = 5e-5, 60
-FEW, MANY = 500, 3_000
+FEW, MANY = 500, 1_500
 
 
 def steps(count: int, sizes_m: np.ndarray) -> Recording:
@@ -31,12 +31,16 @@ def test_what_can_be_fitted_whole_is() -> None:
 
 @pytest.fixture(scope="module")
 def long() -> Recording:
-    """Of three thousand moves every hundredth is ten times the others."""
+    """Of many moves every hundredth is ten times the others."""
     return steps(MANY, np.where(np.arange(MANY) % 100 == 50, 0.02, 0.002))
 
 
-def test_stretches_are_spread_over_a_long_one_and_cost_what_is_allowed(long: Recording) -> None:
-    chosen = informative(long)
+@pytest.fixture(scope="module")
+def chosen(long: Recording) -> Recording:
+    return informative(long)
+
+
+def test_stretches_are_spread_over_a_long_one_and_cost_what_is_allowed(long: Recording, chosen: Recording) -> None:
     record = ready(chosen)
     assert len(record.segments) == PARTS
     starts_s = chosen.time_s[[first for first, _ in record.segments]]
@@ -45,8 +49,9 @@ def test_stretches_are_spread_over_a_long_one_and_cost_what_is_allowed(long: Rec
     assert 0.8 * FITTED_WORK < rows + SLIP_ROWS * len(chosen) / HELD <= 1.05 * FITTED_WORK
 
 
-def test_they_are_where_the_stem_travels_the_farthest_and_begin_and_end_at_rest(long: Recording) -> None:
-    chosen = informative(long)
+def test_they_are_where_the_stem_travels_the_farthest_and_begin_and_end_at_rest(
+    long: Recording, chosen: Recording
+) -> None:
     far = np.flatnonzero(np.abs(np.diff(long.position_m)) > 0.01)
     assert np.isin(far, chosen.time_s).mean() > 0.7, "time counts the samples"
     for first, end in ready(chosen).segments:

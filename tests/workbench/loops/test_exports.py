@@ -2,7 +2,7 @@
 
 import json
 import re
-from collections.abc import Callable, Iterator
+from collections.abc import Callable, Iterator, Sequence
 from datetime import UTC, datetime, timedelta
 from pathlib import Path
 
@@ -15,10 +15,13 @@ from workbench.imports.loop_reader import read_loop
 
 LOOP = draw_loop(10, "sticks")
 BEGIN = datetime(2026, 3, 2, 6, tzinfo=UTC)
-ROWS = [
+Row = tuple[datetime, dict[str, float]]
+ROWS: list[Row] = [
     (BEGIN + timedelta(seconds=float(time_s)), {"OP": op, "PV": pv, "SP": sp})
     for time_s, op, pv, sp in zip(LOOP.time_s, LOOP.op_pct, LOOP.pv, LOOP.sp, strict=True)
 ]
+SOME = ROWS[:300]
+"""Enough to be read."""
 NAMES = ("OP", "PV", "SP")
 
 
@@ -26,7 +29,7 @@ def pi_datalink() -> Iterator[str]:
     """Yield PI DataLink's: a function array a tag, each with its own clock, and words where a value is bad."""
     yield ",".join(f"FIC101.{name}," for name in NAMES)
     yield ",".join(["Timestamp,Value"] * 3)
-    for row, (at, values) in enumerate(ROWS):
+    for row, (at, values) in enumerate(SOME):
         late = [at + timedelta(seconds=0.137 * place) for place in range(3)]
         cells = [f"{values[name]:.4f}" for name in NAMES]
         cells[1] = "Bad Input" if row % 97 == 5 else cells[1]
@@ -40,46 +43,46 @@ def aspen() -> Iterator[str]:
     yield "Name,FIC101.PV,FIC101.SP,FIC101.OP"
     yield "Description,Feed to column,Feed to column,Feed valve"
     yield "Units,m3/h,m3/h,%"
-    yield from (f"{t:%d-%b-%y %H:%M:%S}.0,{v['PV']:.4f},{v['SP']:.4f},{v['OP']:.4f}" for t, v in ROWS)
+    yield from (f"{t:%d-%b-%y %H:%M:%S}.0,{v['PV']:.4f},{v['SP']:.4f},{v['OP']:.4f}" for t, v in SOME)
 
 
 def ignition() -> Iterator[str]:
     """Yield Ignition's data set: lines of names, kinds and the number of rows."""
     yield from ('"#NAMES"', '"t_stamp","FIC101/PV","FIC101/SP","FIC101/OP"', '"#TYPES"', '"date","D","D","D"')
-    yield f'"#ROWS","{len(ROWS)}"'
-    yield from (f'"{t:%Y-%m-%d %H:%M:%S}.000","{v["PV"]:.6f}","{v["SP"]:.6f}","{v["OP"]:.6f}"' for t, v in ROWS)
+    yield f'"#ROWS","{len(SOME)}"'
+    yield from (f'"{t:%Y-%m-%d %H:%M:%S}.000","{v["PV"]:.6f}","{v["SP"]:.6f}","{v["OP"]:.6f}"' for t, v in SOME)
 
 
 def ignition_script() -> Iterator[str]:
     """Yield what Ignition's scripts write: Java's dates."""
     yield "t_stamp,FIC101_PV,FIC101_OP"
-    for t, v in ROWS:
+    for t, v in SOME:
         yield f'"{t:%b} {t.day}, {t.year} {t:%I}:{t:%M:%S} {t:%p}",{v["PV"]:.6f},{v["OP"]:.6f}'
 
 
-def grafana() -> Iterator[str]:
+def grafana(rows: Sequence[Row] = SOME) -> Iterator[str]:
     """Yield Grafana's, formatted: each cell with its unit."""
     yield '"Time","FIC101.PV","FIC101.SP","FIC101.OP"'
-    yield from (f'"{t:%Y-%m-%d %H:%M:%S}","{v["PV"]:.2f} m³/h","{v["SP"]:.2f} m³/h","{v["OP"]:.2f}%"' for t, v in ROWS)
+    yield from (f'"{t:%Y-%m-%d %H:%M:%S}","{v["PV"]:.2f} m³/h","{v["SP"]:.2f} m³/h","{v["OP"]:.2f}%"' for t, v in rows)
 
 
 def grafana_unformatted() -> Iterator[str]:
     """Yield Grafana's, unformatted: milliseconds."""
     yield '"Time","FIC101.PV","FIC101.OP"'
-    yield from (f"{1000 * int(t.timestamp())},{v['PV']:.4f},{v['OP']:.4f}" for t, v in ROWS)
+    yield from (f"{1000 * int(t.timestamp())},{v['PV']:.4f},{v['OP']:.4f}" for t, v in SOME)
 
 
 def opc_hda() -> Iterator[str]:
     """Yield an OPC HDA client's: a row a value, one item after the other, with its quality."""
     yield "ItemID,Timestamp,Value,Quality"
     for name in NAMES:
-        yield from (f"Plant.FIC101.{name},{t:%Y-%m-%dT%H:%M:%S}.000Z,{v[name]:.4f},192" for t, v in ROWS)
+        yield from (f"Plant.FIC101.{name},{t:%Y-%m-%dT%H:%M:%S}.000Z,{v[name]:.4f},192" for t, v in SOME)
 
 
 def wincc() -> Iterator[str]:
     """Yield WinCC's: a row a value, decimal commas."""
     yield '"VarName";"TimeString";"VarValue";"Validity"'
-    for t, v in ROWS:
+    for t, v in SOME:
         for name in NAMES:
             yield f'"FIC101_{name}";"{t:%d.%m.%Y %H:%M:%S}";' + f"{v[name]:.4f}".replace(".", ",") + ";1"
 
@@ -101,14 +104,14 @@ def test_another_programs_export_is_read_by_what_the_messages_say(
         assert len(formats) + len(named) == 1
         read = read_loop(path, named, time_format=next(iter(formats), None))
     assert "FIC101" in read.name
-    assert read.time_s.size == len(ROWS)
+    assert read.time_s.size == len(SOME)
     assert read.op_pct[10] == pytest.approx(LOOP.op_pct[10], abs=0.06)
     assert read.pv[10] == pytest.approx(LOOP.pv[10], abs=0.01)
 
 
 def test_from_a_formatted_export_to_the_verdict(tmp_path: Path) -> None:
     export, found = tmp_path / "export.csv", tmp_path / "found.json"
-    export.write_text("\n".join(grafana()) + "\n", encoding="utf-8")
+    export.write_text("\n".join(grafana(ROWS)) + "\n", encoding="utf-8")
     assert main(["loop", str(export), "--json", str(found)]) == 1
     (told,) = json.loads(found.read_text())
     assert (told["loop"], told["verdict"]) == ("FIC101", "sticks")
