@@ -6,15 +6,19 @@ from pathlib import Path
 import numpy as np
 import pytest
 
+from config.drive import KINDS
 from config.errors import InputError
 from config.recording import Recording
 from config.valve_file import ValveFile, load_valve
 from sim.simulation import simulate
 from sim.static_inverse import extended_valve
 from workbench.compare.comparison import Comparison, compare
+from workbench.compare.slip_matching import SlipEvents
 from workbench.fit.fitting import fit
 from workbench.report.comparison_report import report_comparison
+from workbench.report.overlay import overlay
 from workbench.report.page import Subject
+from workbench.report.units import Reading
 
 NOISE_RAD = 5e-4
 DRIVE = """[drive]
@@ -89,6 +93,13 @@ def test_a_report_draws_it_in_the_drives_units(
     assert ", mm" not in text
     assert ", kPa" not in text
     assert "Drive “axis 1”" in text
+
+
+def test_a_slip_is_marked_where_the_drive_was() -> None:
+    angle_rad, slips = np.array([0.0, 1.5, 1.5]), SlipEvents((), (1.0,), ())
+    figure = overlay(np.arange(3.0), np.zeros(3), angle_rad, [], [], slips, read=Reading(KINDS["rotary"]))
+    (mark,) = (each for each in figure["data"] if each["name"] == "missed slip")
+    assert (mark["x"], mark["y"]) == ([1.0], [1.5])
 
 
 def test_a_recording_of_another_kind_is_refused(axis: ValveFile, recording: Recording) -> None:

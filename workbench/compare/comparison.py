@@ -6,7 +6,7 @@ floor is unknown nothing is called adequate.
 """
 
 from collections.abc import Sequence
-from dataclasses import dataclass, fields
+from dataclasses import dataclass
 from typing import TYPE_CHECKING
 
 import numpy as np
@@ -21,7 +21,7 @@ from config.valve_file import ValveFile
 from signals.moves import Slip, slips
 from sim.composition import Composition
 from workbench.compare.comparison_sentences import Findings, Stretch, judged, shortened
-from workbench.compare.friction_balance import Forces, FrictionBalance, balance, forces
+from workbench.compare.friction_balance import Forces, FrictionBalance, balance, forces, joined
 from workbench.compare.measures import fit_percent, rms, robust, valid_rows
 from workbench.compare.phases import PHASES, phases
 from workbench.compare.residuals import (
@@ -269,7 +269,7 @@ def compare_record(record: Record, valve: ValveFile) -> Comparison:
         input_correlation=with_input,
         spectrum=spectrum(even[1], period_s),
         friction=balance(
-            _all([each.measured_forces for each in segments]), _all([each.model_forces for each in segments])
+            joined([each.measured_forces for each in segments]), joined([each.model_forces for each in segments])
         ),
         by_setpoint=record.by_setpoint,
         kind=valve.valve.kind,
@@ -347,10 +347,6 @@ def _joined(events: Sequence[SlipEvents]) -> SlipEvents:
         tuple(t for each in events for t in each.missed_s),
         tuple(t for each in events for t in each.spurious_s),
     )
-
-
-def _all(parts: Sequence[Forces]) -> Forces:
-    return Forces(*(np.concatenate([getattr(part, each.name) for part in parts]) for each in fields(Forces)))
 
 
 def _evenly(record: Record, residual_m: Column) -> tuple[tuple[Column, Column], float]:

@@ -5,7 +5,8 @@
 p is the measured pressure, or the model's where there is none. x'' comes from local parabolas over nine samples.
 """
 
-from dataclasses import dataclass
+from collections.abc import Sequence
+from dataclasses import dataclass, fields
 
 import numpy as np
 
@@ -57,6 +58,11 @@ def forces(
     moving = way != 0
     every = (time_s, position_m, velocity, way.astype(np.float64), pressure_pa, friction_n)
     return Forces(*(each[moving] for each in every))
+
+
+def joined(parts: Sequence[Forces]) -> Forces:
+    """Return the forces of several stretches as one."""
+    return Forces(*(np.concatenate([getattr(part, each.name) for part in parts]) for each in fields(Forces)))
 
 
 def balance(measured: Forces, simulated: Forces) -> FrictionBalance:

@@ -215,9 +215,10 @@ class Balance:
                 unit = 1.0 if speeds is None else float(np.median(np.abs(speeds)))
                 shapes[key] = tuple(unit * each for each in tried) or declared.starts_for(self.valve)[:1]
         found = [Term(effect, strength, 1.0, each) for each in _products(shapes)]
-        if effect.parameters[strength].least < 0.0:
-            if not np.allclose(self._values_of(found[0]), -self._values_of(replace(found[0], unit=-1.0))):
-                found = [replace(each, unit=unit, of_sign=True) for each in found for unit in (1.0, -1.0)]
+        if effect.parameters[strength].least >= 0.0:
+            return found
+        if not np.allclose(self._values_of(found[0]), -self._values_of(replace(found[0], unit=-1.0))):
+            found = [replace(each, unit=unit, of_sign=True) for each in found for unit in (1.0, -1.0)]
         return found
 
     def _column(self, term: Term, z: Column) -> Column:

@@ -18,7 +18,7 @@ from config.valve_file import ValveFile
 from sim.composition import BASE, Composition
 from sim.karnopp import Vector
 from workbench.compare.comparison import Comparison, compare_record
-from workbench.compare.friction_balance import Forces, forces
+from workbench.compare.friction_balance import Forces, forces, joined
 from workbench.compare.measures import rms, valid_rows
 from workbench.data.record import Record, require_units
 from workbench.model.free_run import FreeRun, Run
@@ -178,7 +178,7 @@ class LiveModel:
         run = self._run.run(self._effective())
         measured = [self._forces(run, self.record.position_m, each) for each in self.record.segments]
         model = [self._forces(run, run.indicated_m, each) for each in self.record.segments]
-        return _join_parts(measured), _join_parts(model)
+        return joined(measured), joined(model)
 
     def _forces(self, run: Run, position_m: Column, segment: tuple[int, int]) -> Forces:
         rows = slice(*segment)
@@ -238,8 +238,3 @@ def _reach(starts: Sequence[float], off: float | None, *, positive: bool) -> tup
 def _put(theta: Vector, parameter: Parameter, share: float) -> None:
     least, most = parameter.bounds
     parameter.put(theta, least + min(max(share, 0.0), 1.0) * (most - least))
-
-
-def _join_parts(parts: list[Forces]) -> Forces:
-    names = ("time_s", "position_m", "velocity_m_per_s", "direction", "pressure_pa", "friction_n")
-    return Forces(*(np.concatenate([getattr(part, name) for part in parts]) for name in names))

@@ -90,7 +90,7 @@ def overlay(
         error_m = each.position_m - measured_m
         traces.append(_position(time_s, error_m, f"error, {each.name}", each.colour, "y2", read, showlegend=False))
     if slips is not None and bool(np.all(np.diff(time_s) > 0.0)):
-        traces += _marks(time_s, measured_m, slips)
+        traces += _marks(time_s, measured_m, slips, read.kind.length.factor)
     command = drawn(time_s, command_pa)
     asked = _command_label(read, by_setpoint)
     traces.append(
@@ -187,7 +187,7 @@ def _runs(rows: Mask) -> Iterator[tuple[int, int]]:
     yield from list(pairwise(edges.tolist()))[::2]
 
 
-def _marks(time_s: Column, measured_m: Column, slips: SlipEvents) -> Iterator[Trace]:
+def _marks(time_s: Column, measured_m: Column, slips: SlipEvents, factor: float) -> Iterator[Trace]:
     along_s = time_s - time_s[0]
     for name, times, symbol, colour in (
         ("missed slip", slips.missed_s, "triangle-up", "#b4491b"),
@@ -197,7 +197,7 @@ def _marks(time_s: Column, measured_m: Column, slips: SlipEvents) -> Iterator[Tr
             rows = np.clip(np.searchsorted(along_s, np.asarray(times)), 0, time_s.size - 1)
             yield {
                 "type": "scatter", "mode": "markers", "name": name, "yaxis": "y",
-                "x": rounded(np.asarray(times, np.float64), 5), "y": rounded(1e3 * measured_m[rows], 4),
+                "x": rounded(np.asarray(times, np.float64), 5), "y": rounded(factor * measured_m[rows], 4),
                 "marker": {"symbol": symbol, "size": 11, "color": colour, "line": {"width": 2, "color": colour}},
                 "hovertemplate": "at %{x:.3f} s<extra>" + name + "</extra>",
             }  # fmt: skip
