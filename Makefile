@@ -22,7 +22,8 @@ test: $(READY)          ## lint, types, import contracts and the whole test suit
 
 suite: $(READY)
 	@$(MAKE) --no-print-directory browser # no prerequisite: that one ends at once, and make -j may begin the next only after lint
-	@$(BIN)/pytest --collect-only -qq > /dev/null || true # what pytest makes of the tests' files is kept: once, not in every worker
+	@# What pytest makes of the tests' files is kept: in a fresh clone once, not in every worker.
+	@test -e $(VENV)/.rewritten || { $(BIN)/pytest --collect-only -qq > /dev/null; touch $(VENV)/.rewritten; }
 	$(BIN)/pytest --numprocesses=auto -m 'not long'
 
 long: $(READY) browser  ## the tests that take long: whole searches, journeys and campaigns, every recipe followed

@@ -10,7 +10,7 @@ from config.valve_file import ValveFile
 from sim.composition import COULOMB, STATIC, Composition
 from tests.workbench.valves import NOISE_M, SEED, record_of, with_effect
 from workbench.data.record import Record, ready
-from workbench.fit.likelihood import Likelihood, soft
+from workbench.fit.likelihood import Likelihood, soft, soft_weight
 from workbench.fit.onsets import with_onsets
 from workbench.fit.problem import problem
 from workbench.model.free_run import FreeRun
@@ -95,3 +95,13 @@ def test_a_rest_is_held_whatever_the_command_says_of_it() -> None:
     first = run.moves[0]
     rest = run.run(Composition.from_file(SEED).theta, run.first_onsets_s()).indicated_m[: first.before]
     assert np.ptp(rest) < 1e-9
+
+
+@pytest.mark.parametrize("scale", [0.5, 3.0])
+def test_the_cost_is_a_parabola_at_the_noise_a_line_beyond_and_its_slope_is_the_weight(scale: float) -> None:
+    r, step = np.linspace(-20.0, 20.0, 401), 1e-5
+    slope = (soft(r + step, scale) - soft(r - step, scale)) / (2.0 * step)
+    np.testing.assert_allclose(soft_weight(r, scale) * r, slope, atol=1e-8)
+    small, large = np.array([0.0, 1e-3 * scale]), np.array([1e4 * scale])
+    np.testing.assert_allclose(soft(small, scale), 0.5 * small**2, rtol=1e-5, atol=1e-12)
+    np.testing.assert_allclose(soft(large, scale), scale * large, rtol=1e-3)
