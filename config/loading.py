@@ -72,6 +72,17 @@ def _named(path: str) -> str:
     return path
 
 
+def wide(least: float, *, either_way: bool = False) -> AfterValidator:
+    """Let two ends be so far apart, the lower one first unless `either_way`."""
+
+    def checked(ends: tuple[float, float]) -> tuple[float, float]:
+        if (abs(ends[1] - ends[0]) if either_way else ends[1] - ends[0]) < least:
+            raise ValueError(f"must be at least {least:g} wide{'' if either_way else ', the lower end first'}")
+        return ends
+
+    return AfterValidator(checked)
+
+
 T = TypeVar("T")
 Many = Annotated[tuple[T, ...], Strict(False)]
 """An array, of any length or"""

@@ -5,7 +5,7 @@ from typing import Annotated, Literal, Self
 
 from pydantic import Field, field_validator, model_validator
 
-from config.loading import Fraction, Many, NonNegative, Pair, Schema
+from config.loading import Fraction, Many, NonNegative, Pair, Schema, wide
 
 MOST_POLYGON_POINTS = 20
 """Of a polygon."""
@@ -23,7 +23,7 @@ class TravelTable(Schema):
     """Of equal percentage and of quick opening."""
     polygon: Many[Pair[Fraction]] = ()
     """Points (signal, opening) of `characteristic = "polygon"`, from signal 0 to 1."""
-    split_range: Pair[Fraction] = (0.0, 1.0)
+    split_range: Annotated[Pair[Fraction], wide(NARROWEST_SPLIT, either_way=True)] = (0.0, 1.0)
     """The signals at which the valve is closed and open; the second lower: it opens as the signal falls."""
     ramp_opening_s: NonNegative = 0.0
     """Time in which the reference opens the valve all the way, at the least; 0: at once."""
@@ -46,13 +46,6 @@ class TravelTable(Schema):
                     f"must rise in signal and opening from point to point, got {list(before)} before {list(after)}"
                 )
         return points
-
-    @field_validator("split_range")
-    @classmethod
-    def _range_is_wide(cls, ends: tuple[float, float]) -> tuple[float, float]:
-        if abs(ends[1] - ends[0]) < NARROWEST_SPLIT:
-            raise ValueError(f"must be at least {NARROWEST_SPLIT:g} wide, got {ends[0]:g} to {ends[1]:g}")
-        return ends
 
     @model_validator(mode="after")
     def _polygon_has_points(self) -> Self:

@@ -136,6 +136,18 @@ def test_effects_keep_their_parameters_for_the_model_side(tmp_path: Path) -> Non
             "[valve]\nstroke_m = 0.1\n[identification]\nwindow_s = 0.1\n",
             "identification: minimum_window_s must be at most window_s (0.1 s)",
         ),
+        *(
+            (
+                f"[valve]\nstroke_m = 0.1\n[{table}]\n{key} = {ends}\n",
+                f"{table}.{key}: must be at least 0.2 wide, the lower",
+            )
+            for table, key in (
+                ("excitation", "travel_window"),
+                ("excitation", "permitted_travel"),
+                ("experiment", "travel_window"),
+            )
+            for ends in ([0.4, 0.5], [0.9, 0.1])
+        ),
         ("[valve]\nstroke_m = 0.1\n[control]\nlaw = 'moves'\n", "control.law: it moved by pulses, and slides where"),
         (
             "[valve]\nstroke_m = 0.1\n[control]\nlaw = 'breakaway'\n",

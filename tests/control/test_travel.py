@@ -174,7 +174,7 @@ def test_an_adapting_dead_band_is_three_deviations_or_half_a_jump_of_a_law_that_
         ({"polygon": [[0.0, 0.0], [0.9, 1.0]]}, "travel.polygon: must go from signal 0 to 1, got 0 to 0.9"),
         ({"polygon": [[0.0, 0.5], [1.0, 0.5]]}, "travel.polygon: must rise in signal and opening"),
         ({"polygon": [[0.0, 0.5], [1.0, 1.5]]}, "travel.polygon"),
-        ({"split_range": [0.5, 0.51]}, "travel.split_range: must be at least 0.05 wide, got 0.5 to 0.51"),
+        ({"split_range": [0.5, 0.51]}, "travel.split_range: must be at least 0.05 wide, got [0.5, 0.51]"),
         ({"ramp_opening_s": -1.0}, "travel.ramp_opening_s: "),
     ],
 )
