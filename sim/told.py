@@ -12,7 +12,8 @@ effects make of static friction F_s at a place and time,
     L = (|F_e| - d) / g                          static friction, N, that just bears the load of a stem at rest
 
 It was at least L at every sample of a rest, and at most L where the stem broke loose. A stem at rest may be anywhere
-within `blur` of where it is held, m: L is the least there, lest a stop, which gives way by micrometres, be a load.
+within `blur` of where it is held, m: of a rest L is the least there, of a break-away the most. A held stem that would
+come to rest again within `UNSEEN` of it gives way, as into a stop: nobody has seen it stay.
 
 Where an effect moves the stuck stem (`creeps`), what is seen to move has not yet broken loose: it does so by itself, at
 F_s by the law of `sim.karnopp`, and no onset tells a load.
@@ -56,6 +57,8 @@ FAR_M = 1e9
 """Place of a stem that was let go and has left."""
 SETTLED_SHARE = 1e-6
 """Of the blur: what an indication moves by in a period once its sensor has come to rest."""
+UNSEEN = 6.0
+"""Times the blur: a stem that moves by less while it is held is not seen to, `COVERED` of `signals.moves`."""
 HELD_N = 1e-9
 """L of a stem that is held and bears nothing: other than 0, which says that it is not."""
 
@@ -79,21 +82,32 @@ def ordinary(told: Karnopp) -> Karnopp:
     return Karnopp(told.per_m, told.A, told.k_s, told.F_v, told.F_c, told.F_s, told.v_s, told.dz, 0.0)
 
 
-def load(valve: Karnopp, stem: Stem, blur: float, q: Any, z: Any) -> float:
-    """L, N."""
+def load(valve: Karnopp, stem: Stem, blur: float, breaks: bool, q: Any, z: Any) -> float:
+    """L, N, within the blur: the least that a rest bore, or the most with which the stem breaks loose."""
     F_e = external_force(valve, stem, q, z)
-    farther = external_force(valve, Stem(stem.t, stem.x + (blur if F_e > 0.0 else -blur), 0.0, stem.p), q, z)
-    nearer = external_force(valve, Stem(stem.t, stem.x - (blur if F_e > 0.0 else -blur), 0.0, stem.p), q, z)
-    if F_e * farther <= 0.0 or F_e * nearer <= 0.0:
-        return 0.0
-    least = min(abs(F_e), abs(farther), abs(nearer))
-    F_e = least if F_e > 0.0 else -least
     direction = 1.0 if F_e > 0.0 else -1.0
+    farther = direction * external_force(valve, Stem(stem.t, stem.x + direction * blur, 0.0, stem.p), q, z)
+    nearer = direction * external_force(valve, Stem(stem.t, stem.x - direction * blur, 0.0, stem.p), q, z)
+    least, most = min(abs(F_e), farther, nearer), max(abs(F_e), farther, nearer)
+    if least <= 0.0 and not breaks:
+        return 0.0
+    F_e = direction * (most if breaks else least)
     more = SHARE * valve.F_s
     _, F_s = friction(valve.F_c, valve.F_s, direction, stem, q, z)
     _, F_m = friction(valve.F_c, valve.F_s + more, direction, stem, q, z)
     g = (F_m - F_s) / more
     return valve.F_s + (direction * F_e - F_s) / g if g > 0.0 else valve.F_s
+
+
+def gives_way(free: Karnopp, stem: Stem, blur: float, q: Any, z: Any) -> bool:
+    """Whether a stem at rest breaks loose and stops again before anybody sees it, as in a stop."""
+    F_e = external_force(free, stem, q, z)
+    direction = 1.0 if F_e > 0.0 else -1.0
+    F_c, F_s = friction(free.F_c, free.F_s, direction, stem, q, z)
+    if abs(F_e) <= F_s:
+        return False
+    there = Stem(stem.t, stem.x + direction * UNSEEN * blur, 0.0, stem.p)
+    return direction * external_force(free, there, q, z) <= F_c
 
 
 def carried(
@@ -136,9 +150,11 @@ def carried(
             p0, p = pressure(command, command, s, Stem(t0, there, v, p), q, z)
             rested = mode == STUCK
             if rested or abs(x - place) <= blur:
-                most = max(most, load(valve, Stem(t0, x, 0.0, p0), blur, q, z))
-            law, drive = free if creeps or fast > 0.0 else valve, Drive(t0, p0, (p - p0) / s)
-            x, v, mode, sigma, indicated = follow(law, drive, s, x, v, p, mode, sigma, tolerance, held, q, z)
+                most = max(most, load(valve, Stem(t0, x, 0.0, p0), blur, not held, q, z))
+            stays = held and not (rested and gives_way(free, Stem(t0 + s, x, 0.0, p), blur, q, z))
+            law = free if creeps or fast > 0.0 or held != stays else valve
+            drive = Drive(t0, p0, (p - p0) / s)
+            x, v, mode, sigma, indicated = follow(law, drive, s, x, v, p, mode, sigma, tolerance, stays, q, z)
             if mode == STUCK:
                 fast = 0.0
             elif abs(v) > FAST * valve.v_s:
@@ -146,7 +162,7 @@ def carried(
             t0 += s
             left -= s
             if mode == STUCK and held and not (rested and p == p0):
-                most = max(most, load(valve, Stem(t0, x, v, p), blur, q, z))
+                most = max(most, load(valve, Stem(t0, x, v, p), blur, False, q, z))
     off = unknown(sigma + excess(valve, Stem(t + duration, x, v, p), q, z))
     return Told(Condition(t + duration, x + off, v, p, mode, sigma, indicated + off), most, fast)
 
@@ -185,7 +201,7 @@ def tell(
     convex between, and greatest at one of the ends.
     """
     valve, now, fast = told_valve(theta), read(state), 0.0
-    place = FAR_M
+    place, yields = FAR_M, creeps > 0.0
     indicated[0] = now.indicated
     k, n = 0, len(commands)
     while k < n:
@@ -202,21 +218,7 @@ def tell(
                 for j in range(k + 1, end):
                     rests_s += periods[j]
             here = carried(
-                *(
-                    valve,
-                    now,
-                    command,
-                    rests_s,
-                    longest_step,
-                    tolerance,
-                    True,
-                    creeps > 0.0,
-                    fast,
-                    fed,
-                    rate,
-                    blur,
-                    FAR_M,
-                ),
+                *(valve, now, command, rests_s, longest_step, tolerance, True, yields, fast, fed, rate, blur, FAR_M),
                 *(theta, state),
             )
             now, fast = here.now, here.fast
@@ -227,21 +229,7 @@ def tell(
             still = abs(now.x - place) <= blur
             fed += rate * rests_s
             here = carried(
-                *(
-                    valve,
-                    now,
-                    command,
-                    slides_s,
-                    longest_step,
-                    tolerance,
-                    False,
-                    creeps > 0.0,
-                    fast,
-                    fed,
-                    rate,
-                    blur,
-                    place,
-                ),
+                *(valve, now, command, slides_s, longest_step, tolerance, False, yields, fast, fed, rate, blur, place),
                 *(theta, state),
             )
             now, fast = here.now, here.fast

@@ -40,7 +40,7 @@ class Parameters(NamedTuple):
         ),
     ]
     stiffness_n_per_m: Annotated[
-        float, Parameter("contact stiffness", 1e5, 1e9, starts=(2000.0,), scale="spring_n_per_m", given=True)
+        float, Parameter("contact stiffness", 1e5, 1e9, starts=(2000.0,), scale="spring_n_per_m")
     ]
     damping_ns_per_m: Annotated[
         float, Parameter("contact damping", 0.0, 1e5, starts=(16.0,), scale="viscous_ns_per_m", given=True)

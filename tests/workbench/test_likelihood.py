@@ -17,6 +17,7 @@ from workbench.model.free_run import FreeRun
 from workbench.model.told_run import ToldRun, told_moves
 
 LAG = with_effect(SEED, "ip_lag", time_constant_s=0.15)
+STOP = {"lower_m": 0.0, "travel_m": 0.6 * SEED.valve.stroke_m, "stiffness_n_per_m": 5e6, "damping_ns_per_m": 1e4}
 YIELDS = with_effect(SEED, "presliding", stiffness_n_per_m=1.5e6)
 
 
@@ -39,7 +40,9 @@ def likelihood(file: ValveFile, record: Record) -> Likelihood:
     return problem(record, file.valve).likelihood(Composition.from_file(file))
 
 
-@pytest.mark.parametrize("file", [SEED, LAG, YIELDS, with_effect(SEED, "preload", force_n=300.0)])
+@pytest.mark.parametrize(
+    "file", [SEED, LAG, YIELDS, with_effect(SEED, "end_stop", **STOP), with_effect(SEED, "preload", force_n=300.0)]
+)
 def test_told_when_it_moves_the_true_valve_leaves_the_noise(file: ValveFile) -> None:
     record = ready(recording(file))
     like = likelihood(file, record)
@@ -48,6 +51,7 @@ def test_told_when_it_moves_the_true_valve_leaves_the_noise(file: ValveFile) -> 
     for each in (groups.motion, groups.rests):
         assert np.sqrt(np.mean(each**2)) < 1.25
     assert np.sqrt(np.mean(groups.landings**2)) < 2.0
+    assert groups.break_aways.max(initial=0.0) < 2.0
 
 
 def test_static_friction_has_no_part_in_when_a_told_stem_moves() -> None:
