@@ -21,7 +21,7 @@ import argparse
 import time
 from collections import Counter
 from collections.abc import Iterator, Mapping, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from pathlib import Path
 
 import numpy as np
@@ -30,6 +30,7 @@ from benchmarks.few_slips import EFFECTS, drawn
 from benchmarks.kept_lines import Line, kept, run
 from config.recording import Recording
 from config.valve_file import ValveFile, find_valve, load_valve
+from sim.composition import Composition
 from sim.effect import shipped_effect, tried_effects
 from tests.workbench.generators import KINDS, LAWS, case
 from workbench.blind.hiding import VISIBLE_FLOORS, hide
@@ -39,14 +40,14 @@ from workbench.select.effect_candidates import indistinguishable
 from workbench.select.equivalence import algebraic_class
 
 SEEDS: Mapping[str, range] = {
-    "clean": range(81000, 81060),
-    "dirty": range(82000, 82040),
-    "nothing": range(83000, 83030),
-    "two": range(84000, 84016),
+    "clean": range(81000, 81100),
+    "dirty": range(82000, 82060),
+    "nothing": range(83000, 83040),
+    "two": range(84000, 84020),
     "two_dirty": range(86000, 86010),
-    "removed": range(85000, 85016),
-    "others": range(2900, 2912),
-    "outside": range(2950, 2962),
+    "removed": range(85000, 85040),
+    "others": range(2900, 2915),
+    "outside": range(2950, 2965),
     "few_slips": range(1000, 1060),
 }
 """Nobody has looked at a case before the rules stood."""
@@ -74,6 +75,8 @@ class Problem:
     floor_m: float
     """Of the record held out."""
     setting: str
+    truth: Mapping[str, float] = field(default_factory=dict)
+    """By the names of fitted parameters; empty where another law made the record."""
 
 
 def problem(family: str, seed: int) -> Problem:
@@ -90,7 +93,11 @@ def problem(family: str, seed: int) -> Problem:
     visible = all(each["is_visible"] for each in made.answer["visible"].values())
     floor_m = made.answer["floor_m"]
     setting = "dirty" if dirty else "clean"
-    return Problem(made.fit, made.test, made.base, library, hidden, visible, floor_m["fit"], floor_m["test"], setting)
+    own = Composition.from_file(made.truth)
+    truth = dict(zip(own.names, map(float, own.theta), strict=True))
+    return Problem(
+        made.fit, made.test, made.base, library, hidden, visible, floor_m["fit"], floor_m["test"], setting, truth
+    )
 
 
 def _other(family: str, seed: int) -> Problem:
@@ -106,7 +113,10 @@ def _other(family: str, seed: int) -> Problem:
 def _few_slips(seed: int) -> Problem:
     effects = ((), *((name,) for name in EFFECTS))[seed % (1 + len(EFFECTS))]
     made, base = drawn(seed, effects), load_valve(find_valve("seed"))
-    return Problem(made.fit, made.test, base, tried_effects(), effects, True, made.noise_m, made.noise_m, "clean")
+    truth = {**made.valve, **made.hidden}
+    return Problem(
+        made.fit, made.test, base, tried_effects(), effects, True, made.noise_m, made.noise_m, "clean", truth
+    )
 
 
 def _same(name: str) -> frozenset[str]:
@@ -142,6 +152,7 @@ def line(family: str, seed: int) -> Line:
         "floor_m": posed.floor_m,
         "told_floor_m": found.split.floor_m,
         "parameters": _parameters(found),
+        "truth": {name: posed.truth[name] for name in found.best.fit.parameters if name in posed.truth},
         "seconds": round(time.perf_counter() - began_s, 1),
         "cpu_seconds": round(time.process_time() - cpu_s, 1),
     }
@@ -224,8 +235,10 @@ def summary(lines: Sequence[Line]) -> Iterator[str]:
 
 
 def report(lines: Sequence[Line]) -> Iterator[str]:
-    """Yield the figures, family by family, and the confusion table."""
+    """Yield the figures, family by family, the intervals that hold, and the confusion table."""
     yield from summary(lines)
+    yield ""
+    yield from intervals(lines)
     yield ""
     for family in SEEDS:
         chosen = [each for each in lines if each["family"] == family]
@@ -233,6 +246,27 @@ def report(lines: Sequence[Line]) -> Iterator[str]:
             yield from _figures(family, chosen)
             yield ""
     yield from confusion([each for each in lines if each["family"] in {"clean", "dirty"} and each["visible"]])
+
+
+def intervals(lines: Sequence[Line]) -> Iterator[str]:
+    """Yield how many 95 % intervals contain the truth, where all that is hidden was named, and nothing else."""
+    right = [
+        each
+        for each in lines
+        if each["hidden"] and each["verdict"] in NAMES_ALL and sorted(each["missing"]) == sorted(each["hidden"])
+    ]
+    yield "95 % intervals that contain the truth, of cases whose effects were named and nothing else"
+    for family in SEEDS:
+        held: dict[str, list[bool]] = {"valve": [], "effects": []}
+        for each in right:
+            if each["family"] != family:
+                continue
+            for name, value in each.get("truth", {}).items():
+                _, lower, upper = each["parameters"][name]
+                held["effects" if "." in name else "valve"].append(lower <= value <= upper)
+        for whose, contained in held.items():
+            if contained:
+                yield share(f"{family}: {whose}", contained)
 
 
 def _figures(family: str, lines: Sequence[Line]) -> Iterator[str]:
