@@ -10,6 +10,7 @@ from config.valve_file import ValveFile
 from sim.composition import COULOMB, STATIC, Composition
 from tests.workbench.valves import NOISE_M, SEED, record_of, with_effect
 from workbench.data.record import Record, ready
+from workbench.fit.fitting import fit
 from workbench.fit.likelihood import Likelihood, soft, soft_weight
 from workbench.fit.onsets import with_onsets
 from workbench.fit.problem import problem
@@ -34,6 +35,13 @@ def steps() -> Column:
 
 def recording(file: ValveFile, seed: int = 3) -> Recording:
     return record_of(file, seed, command_pa=steps())
+
+
+def ramps() -> Column:
+    """Return a command of two moves, Pa: a signature, slowly up and down again."""
+    span_pa = SEED.valve.spring_n_per_m * SEED.valve.stroke_m / SEED.valve.diaphragm_area_m2
+    command_pa: Column = span_pa * np.interp(np.arange(0.0, 21.0, 0.01), [0.5, 10.0, 11.0, 20.5], [0.1, 0.9, 0.9, 0.1])
+    return command_pa
 
 
 def likelihood(file: ValveFile, record: Record) -> Likelihood:
@@ -109,3 +117,12 @@ def test_the_cost_is_a_parabola_at_the_noise_a_line_beyond_and_its_slope_is_the_
     small, large = np.array([0.0, 1e-3 * scale]), np.array([1e4 * scale])
     np.testing.assert_allclose(soft(small, scale), 0.5 * small**2, rtol=1e-5, atol=1e-12)
     np.testing.assert_allclose(soft(large, scale), scale * large, rtol=1e-3)
+
+
+def test_a_slow_ramp_each_way_tells_spring_and_friction() -> None:
+    record = record_of(SEED, 3, command_pa=ramps())
+    assert len(told_moves(ready(record))) == 2
+    off = SEED.valve.model_copy(update={"spring_n_per_m": 6e4, "coulomb_n": 1500.0, "static_n": 1900.0})
+    found = fit(record, ValveFile(valve=off)).parameters
+    for name in ("spring_n_per_m", "coulomb_n"):
+        assert found[name].value == pytest.approx(getattr(SEED.valve, name), rel=2e-3)
