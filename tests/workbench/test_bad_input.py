@@ -102,7 +102,7 @@ def test_what_cannot_be_used_is_one_line_from_the_api(case: str, asked: str) -> 
 
 
 TOO_LITTLE: dict[str, tuple[Columns, str]] = {
-    "still": (still(), "the stem moves 0 times, at least 3 are needed"),
+    "still": (still(), "the stem moves 0 times, at least 2 are needed"),
     "one direction": (opening_only(), "the stem only opens: friction and spring cannot be told apart"),
 }
 
