@@ -187,7 +187,7 @@ def served_m(valve: Path) -> float:
     slave = valve.with_name("slave.toml")
     sensor = "[sensor]\nnoise_std_m = 0.0\n"
     slave.write_text(f'valve = "{valve.name}"\n{sensor}[clock]\nmode = "lockstep"\nperiod_s = 0.02\n', encoding="utf-8")
-    with running("sim", slave, "--port", "0") as ready, independent_client(port_in(ready)) as client:
+    with running("sim", slave, "--listen-port", "0") as ready, independent_client(port_in(ready)) as client:
         for _ in range(round(PUSHED_S / 0.02)):
             client.write(SIMULATED_MAP.command_pa.address, list(struct.unpack(">HH", struct.pack(">f", PUSHED_PA))))
         (position_m,) = struct.unpack(">f", struct.pack(">HH", *client.read_input(0, 2)))

@@ -22,7 +22,7 @@ from scipy.special import stdtrit
 
 from sim.composition import STATIC
 from sim.karnopp import Vector
-from workbench.fit.likelihood import Likelihood, soft_weight
+from workbench.fit.likelihood import Likelihood, soft, soft_weight
 from workbench.fit.minimiser import End
 
 PROBABILITY = 0.975
@@ -122,18 +122,17 @@ def _root(covariance: Vector, std: Vector) -> Vector:
 
 def _static_interval(like: Likelihood, end: End, i: int) -> tuple[float, float]:
     """Return between which coordinates of static friction break-aways cost no more than 1.92 above the least."""
-    onsets, theta = end.onsets_s, like.theta(end.z)
-    path = like.run.run(theta, onsets)
+    theta, parameter = like.theta(end.z), like.parameters[i]
+    path = like.run.run(theta, end.onsets_s)
     reach = np.concatenate([-np.geomspace(1.0, 1e-4, 200), [0.0], np.geomspace(1e-4, 1.0, 200)])
-    lowest, highest = like.parameters[i].bounds
-    at = np.unique(np.clip(end.z[i] + reach, lowest, highest))
-    costs = []
+    at = np.unique(np.clip(end.z[i] + reach, *parameter.bounds))
+    static_n = []
     for z in at:
-        there = theta.copy()
-        like.parameters[i].put(there, float(z))
-        costs.append(like.cost(like.break_rows(path, there)))
+        parameter.put(theta, float(z))
+        static_n.append(theta[STATIC])
+    costs = soft(like.rows_of_static(path, np.array(static_n)), like.weights.soft).sum(axis=1)
     scatter = max(1.0, 2.0 * min(costs) / max(like.broken.size - 1, 1))
-    near = at[np.array(costs) <= min(costs) + RISE_95 * scatter]
+    near = at[costs <= min(costs) + RISE_95 * scatter]
     return float(near.min()), float(near.max())
 
 

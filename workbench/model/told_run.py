@@ -160,16 +160,13 @@ class ToldRun:
 
     def _held(self, part: "_Part", onsets_s: Vector) -> Vector:
         """Return the share of each period for which the stem is held."""
-        count = part.starts_s.size - 1
+        held = np.ones(part.starts_s.size - 1)
+        onset_s = onsets_s[part.first : part.end][part.let_go]
+        at = np.clip(np.searchsorted(part.starts_s, onset_s, side="right") - 1, 0, held.size - 1)
         begins = part.begins.copy()
-        let_go = part.let_go
-        onset_s = onsets_s[part.first : part.end][let_go]
-        at = np.clip(np.searchsorted(part.starts_s, onset_s, side="right") - 1, 0, count - 1)
-        begins[let_go] = np.minimum(at + 1, count)
-        change = np.zeros(count + 1)
-        np.add.at(change, begins, -1.0)
-        np.add.at(change, np.maximum(part.overs, begins), 1.0)
-        held = np.where(np.cumsum(change[:-1]) < 0.0, 0.0, 1.0)
+        begins[part.let_go] = at + 1
+        for begin, over in zip(begins.tolist(), part.overs.tolist(), strict=True):
+            held[begin:over] = 0.0
         begin_s, end_s = part.starts_s[at], part.starts_s[at + 1]
         held[at] = np.clip((onset_s - begin_s) / (end_s - begin_s), 0.0, 1.0)
         return held

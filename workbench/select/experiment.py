@@ -24,6 +24,7 @@ from workbench.data.noise_floor import with_noise
 from workbench.data.record import Record, ready
 from workbench.fit.fit_result import Fit
 from workbench.fit.fitting import problem_of
+from workbench.fit.likelihood import soft_weight
 from workbench.fit.minimiser import derivatives
 from workbench.fit.onsets import with_onsets
 from workbench.fit.threads import on_threads
@@ -167,7 +168,7 @@ def _left(answer: Record, rival: Fit) -> float:
     like = of.likelihood(composition, tuple(rival.parameters))
     onsets_s, groups = with_onsets(like, composition.theta)
     jacobian = derivatives(like, like.coordinates(composition.theta), onsets_s)
-    weight = (1.0 + (groups.whole / like.weights.soft) ** 2) ** -0.25
+    weight = np.sqrt(soft_weight(groups.whole, like.weights.soft))
     r = weight * groups.whole
     left = r - (weight[:, None] * jacobian) @ np.linalg.lstsq(weight[:, None] * jacobian, r)[0]
     return float(np.sqrt(np.mean(left**2)))

@@ -19,7 +19,7 @@ from sim.composition import Composition
 from sim.effect import Effect
 from workbench.fit.breaking_off import go_on
 from workbench.fit.fit_result import Fit
-from workbench.fit.likelihood import Groups
+from workbench.fit.likelihood import Groups, soft_weight
 from workbench.fit.minimiser import derivatives
 from workbench.fit.problem import Problem
 from workbench.fit.threads import on_threads
@@ -86,7 +86,7 @@ class _Projection:
     """Residuals (rows,), weighed as the soft-L1 cost does, and what their derivatives (rows, columns) leave of them."""
 
     def __init__(self, r: Series, slopes: Series, soft: float) -> None:
-        self._weights = (1.0 + (r / soft) ** 2) ** -0.25
+        self._weights = np.sqrt(soft_weight(r, soft))
         self._basis, _ = np.linalg.qr(self._weights[:, None] * slopes)
         self._left = self._without(r)
 
