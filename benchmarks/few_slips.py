@@ -19,10 +19,12 @@ import numba
 import numpy as np
 import numpy.typing as npt
 
+from config.errors import InputError
 from config.recording import Recording
 from config.valve_file import find_valve, load_valve
 from sim.effect import find_effects, tried_effects
 from workbench.diagnosis.diagnosis import diagnose
+from workbench.fit.fitting import at_the_noise, fit
 from workbench.select.equivalence import algebraic_class
 
 STEP_S = 2e-5
@@ -253,13 +255,34 @@ def said(seed: int) -> tuple[str, bool, bool]:
     return f"{what} {floors:6.2f} floors {seconds:6.1f} s", alone, in_set
 
 
+def given(seed: int) -> tuple[str, bool]:
+    """Return a line on the fit of a record of a seed with its true effect, and whether it is at the noise."""
+    effects = ((), *((name,) for name in EFFECTS))[seed % (1 + len(EFFECTS))]
+    hidden, sheet = drawn(seed, effects), load_valve(find_valve("seed"))
+    begun = time.process_time()
+    try:
+        found = fit(hidden.fit, sheet, effects=effects, workers=1)
+    except InputError as error:
+        return f"{seed} {', '.join(effects) or 'nothing':20} {error.problem}", True
+    seconds, share = time.process_time() - begun, found.cost / (0.5 * found.count)
+    at_noise = at_the_noise(found.cost, found.count)
+    return f"{seed} {', '.join(effects) or 'nothing':20} {share:6.2f} of the noise's cost {seconds:6.1f} s", at_noise
+
+
 def main() -> None:
     parser = argparse.ArgumentParser(description=__doc__)
+    parser.add_argument("--given", action="store_true", help="fit the true effect alone: is it at the noise?")
     parser.add_argument("--first-seed", type=int, default=300)
     parser.add_argument("--records", type=int, default=20)
     asked = parser.parse_args()
     first = in_set = 0
-    for seed in range(asked.first_seed, asked.first_seed + asked.records):
+    seeds = range(asked.first_seed, asked.first_seed + asked.records)
+    if asked.given:
+        fits = [given(seed) for seed in seeds]
+        print(*(line for line, _ in fits), sep="\n")
+        print(f"at the noise: {sum(at_noise for _, at_noise in fits)} of {len(fits)}")
+        return
+    for seed in seeds:
         line, alone, there = said(seed)
         first, in_set = first + alone, in_set + there
         print(line, flush=True)
