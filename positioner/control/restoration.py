@@ -22,9 +22,8 @@ from math import hypot
 from config.codes import PROVISIONAL, Restored
 from config.extended_valve import ExtendedValve
 from positioner.control.valve_knowledge import ValveKnowledge
-from positioner.estimation.landings.extended_balance import extended_landing_pa
 from positioner.estimation.landings.landing_detector import STOP, VISIBLE, SlideOutcome
-from positioner.estimation.landings.local_balance import landing_pa
+from positioner.estimation.landings.local_balance import known_law, landing_pa
 
 DEVIATIONS, AGREEING_STROKE_SHARE = 3.0, 3e-3
 """Of the stroke: landings nearer than this agree."""
@@ -124,14 +123,10 @@ def _landing_m(
     outcome: SlideOutcome, direction: int, knowledge: ValveKnowledge, valve: ExtendedValve | None, stroke_m: float
 ) -> float:
     """Return where a slide lands: by the law, corrected by what landings near there missed it by."""
-    ratios, landings = knowledge.ratios, knowledge.landings
-    if valve is None:
-        lands_m = knowledge.landing_m(outcome.command_pa, direction)
-        should_pa = landing_pa(lands_m, direction, ratios, landings, stroke_m)
-    else:
-        lands_m = valve.lands_m(outcome.command_pa, direction)
-        should_pa = extended_landing_pa(lands_m, direction, valve, landings, outcome.time_s)
-    return lands_m - (should_pa - outcome.command_pa) / -ratios.b_over_c
+    law = known_law(knowledge.ratios, stroke_m, valve, outcome.time_s)
+    lands_m = (knowledge.landing_m if valve is None else valve.lands_m)(outcome.command_pa, direction)
+    off_pa = landing_pa(lands_m, direction, law, knowledge.landings) - outcome.command_pa
+    return lands_m - off_pa / -knowledge.ratios.b_over_c
 
 
 def _within_m(

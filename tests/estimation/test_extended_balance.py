@@ -8,11 +8,11 @@ import pytest
 from config.extended_valve import ExtendedValve, Inverse
 from positioner.estimation.landings.extended_balance import (
     contradicted,
-    extended_landing_pa,
     extended_scatter_m,
     straight_law,
 )
 from positioner.estimation.landings.landing_detector import SlideOutcome
+from positioner.estimation.landings.local_balance import known_law, landing_pa
 from positioner.estimation.landings.static_law import static_law
 
 L, SLOPE, BEND, F_C, OFFSET = 0.1, 8e5, 3e6, 2e4, 5e3
@@ -44,16 +44,20 @@ def landing(x: float, s: int, beyond_pa: float) -> SlideOutcome:
     return SlideOutcome(0.0, s, x - s * 0.02, command_pa, x, 1e-6, moved=True, landing=True)
 
 
+def lands_pa(x: float, s: int, valve: ExtendedValve, landings: list[SlideOutcome], now_s: float) -> float:
+    return landing_pa(x, s, known_law(straight_law(valve), L, valve, now_s), landings)
+
+
 @pytest.mark.parametrize("s", [1, -1])
 def test_without_landings_it_is_the_table(s: int) -> None:
-    assert extended_landing_pa(0.04, s, VALVE, [], 0.0) == pytest.approx(bent_pa(0.04) + s * F_C, rel=1e-4)
+    assert lands_pa(0.04, s, VALVE, [], 0.0) == pytest.approx(bent_pa(0.04) + s * F_C, rel=1e-4)
 
 
 def test_friction_that_has_grown_is_followed_over_the_whole_travel_in_its_direction() -> None:
     landings = [landing(x, 1, 3e3) for x in (0.02, 0.05, 0.03)]
     for x in (0.01, 0.05, 0.09):
-        assert extended_landing_pa(x, 1, VALVE, landings, 0.0) - VALVE.landing_pa(x, 1) == pytest.approx(3e3, rel=0.05)
-        assert extended_landing_pa(x, -1, VALVE, landings, 0.0) == VALVE.landing_pa(x, -1)
+        assert lands_pa(x, 1, VALVE, landings, 0.0) - VALVE.landing_pa(x, 1) == pytest.approx(3e3, rel=0.05)
+        assert lands_pa(x, -1, VALVE, landings, 0.0) == VALVE.landing_pa(x, -1)
 
 
 def test_a_known_drift_is_gone_on_with_since_the_landing_but_not_for_ever() -> None:
@@ -61,22 +65,13 @@ def test_a_known_drift_is_gone_on_with_since_the_landing_but_not_for_ever() -> N
     landings = [landing(x, s, 0.0) for x in (0.02, 0.05, 0.08) for s in (1, -1)]
     for s in (1, -1):
         for now_s, share in ((0.0, 0.0), (20.0, 0.02), (1e6, 0.1)):
-            beyond_pa = extended_landing_pa(0.05, s, drifting, landings, now_s) - VALVE.landing_pa(0.05, s)
+            beyond_pa = lands_pa(0.05, s, drifting, landings, now_s) - VALVE.landing_pa(0.05, s)
             assert beyond_pa == pytest.approx(s * share * F_C, rel=0.05, abs=1.0)
-
-
-def test_of_a_rounded_indication_less_than_half_a_quantum_says_nothing() -> None:
-    rounded = replace(VALVE, inverse=Inverse(quantum_m=0.01 * L))
-    half_pa = 0.005 * L * -straight_law(VALVE).b_over_c
-    for beyond_pa, believed_pa in ((0.9 * half_pa, 0.0), (-3.0 * half_pa, -2.0 * half_pa)):
-        landings = [landing(x, 1, beyond_pa) for x in (0.02, 0.05, 0.03)]
-        found_pa = extended_landing_pa(0.04, 1, rounded, landings, 0.0) - VALVE.landing_pa(0.04, 1)
-        assert found_pa == pytest.approx(believed_pa, rel=0.1, abs=1.0)
 
 
 def test_what_one_place_alone_says_stays_there() -> None:
     landings = [landing(0.05, 1, 2e3), *(landing(x, 1, 0.0) for x in (0.02, 0.08, 0.02, 0.08))]
-    near, far = (extended_landing_pa(x, 1, VALVE, landings, 0.0) - VALVE.landing_pa(x, 1) for x in (0.05, 0.08))
+    near, far = (lands_pa(x, 1, VALVE, landings, 0.0) - VALVE.landing_pa(x, 1) for x in (0.05, 0.08))
     assert near == pytest.approx(2e3, rel=0.1)
     assert abs(far) < 0.5e3
 

@@ -7,13 +7,10 @@ Neither mass nor viscous friction, lag nor sampling stands in it, and a preload 
 
     stem_at_rest, landing_detector    does the stem rest, and where; which rests are landings, sample by sample
     seen_time                         the time for which the stem was seen: an outage is learnt from by nobody
-    pressure_arrival                  has the measured pressure followed the command, and what a stem takes from then on
     pressure_delivered                is the pressure measured at a rest the one commanded
     static_law, local_balance         κ, φ_up, φ_down with their deviations; the pressure that lands at a position
-    short_slides                      how much farther a short slide goes than it was sent
     breakaway_distance                how far a slide must be sent to break the stem loose
-    mean_nearby                       the mean of what was seen nearby and of late
-    extended_balance                  the same of a valve whose effects are known
+    extended_balance                  is an extended valve the one that is there
     swing                             how far past its balance a stem swings and sticks there
     packing_compliance                how far the packing of a stuck stem gives way
     parting                           the instant that parts landings best

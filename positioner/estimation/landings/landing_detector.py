@@ -9,10 +9,9 @@ of the moving stem holds where it rests. No landing is
   stem is then nothing is said, and it is waited for.
 
 How long a stem takes to answer is learnt: a stem that has not moved may yet, so it is waited for as long as the longest
-answer seen, for the size of the step (a rate limit), or, where the pressure is measured, from its arrival on
-(`pressure_arrival`). One that answers later still corrects what was learnt, but one that moves when ten times the
-longest answer has gone by has been set free by something else: that says nothing of how long it takes. An answer is as
-long as it was seen to be: an outage is no slowness of the stem.
+answer seen, and for the size of the step (a rate limit). One that answers later still corrects what was learnt, but one
+that moves when ten times the longest answer has gone by has been set free by something else: that says nothing of how
+long it takes. An answer is as long as it was seen to be: an outage is no slowness of the stem.
 """
 
 from collections.abc import Callable
@@ -20,7 +19,6 @@ from math import hypot, isnan, nan, sqrt
 from typing import NamedTuple
 
 from config.codes import InhibitReason
-from positioner.estimation.landings.pressure_arrival import PressureArrival
 from positioner.estimation.landings.seen_time import SeenTime
 from positioner.estimation.landings.stem_at_rest import Rest, RestWindow
 
@@ -29,8 +27,6 @@ VISIBLE = 5e-3
 VISIBLE_NOISES = 6.0
 UNDER_WAY = 0.01
 """Of the stroke: a stem that went so far before it rests has answered."""
-PRECISE, LONG = 2e-4, 60
-"""Of the stroke: a rest known no better is averaged on, up to so many samples."""
 WATCHED_REST_SAMPLES = 400
 """Samples of a rest, after which it is only watched."""
 STOP = 0.01
@@ -57,8 +53,6 @@ CREEPS_PER_S, DRIFTS_PER_S = 5e-4, 5e-3
 CREEP, INSTANTS = 1e-3, 2
 """Of the stroke, for each second that a slide takes beyond two samples: behind a slow pressure the stem creeps into its
 rest and sticks, its friction risen, a little before the pressure has come to an end."""
-ONE_SAMPLE = 1.5
-"""Intervals: a level held no longer was changed with the next sample."""
 DISTURBED = 4
 """Samples in a row that must be elsewhere."""
 
@@ -130,7 +124,6 @@ class LandingDetector:
         low_m, high_m = stops_m if stops_m is not None else (0.0, stroke_m)
         self._free_m = (low_m + STOP * stroke_m, high_m - STOP * stroke_m)
         self._window = RestWindow(stroke_m)
-        self._arrival = PressureArrival()
         self._seen = SeenTime()
         self._clock_s = 0.0
         """Of the last sample; all other times are those for which the stem was seen (`seen_time`)."""
@@ -146,6 +139,9 @@ class LandingDetector:
         """Whether the stem has answered that: what moves it now is something else."""
         self.answers = Answers()
         self._step_pa = 0.0
+        """The longest way to the command in force from where the pressure may have been since the last rest."""
+        self._left_pa: tuple[float, ...] = ()
+        """The least and the most of the commands since then."""
         self._rested_pa: float | None = None
         """The command before the last change, if the stem rested under it."""
         self._level_s = self._interval_s = self._time_s = 0.0
@@ -157,7 +153,7 @@ class LandingDetector:
         """Return for how long a stem must have been waited for: longer, if it has not moved after a large step."""
         if self._known or abs(rest.position_m - self._from_m) > self._visible_m(rest):
             return PATIENCE * self.answers.longest_s
-        return PATIENCE * min(self._answers_s or FIRST_ANSWER_S, self._arrival.answered_s)
+        return PATIENCE * (self._answers_s or FIRST_ANSWER_S)
 
     @property
     def _answers_s(self) -> float:
@@ -199,9 +195,9 @@ class LandingDetector:
         if not 0.0 < self.quantum_m < self._finer_m:
             self._learn_quantum(position_m)
         if command_pa != self._level_pa:
-            self._change_level(time_s, command_pa, pressure_pa)
-        if self.rest is None:
-            self._follow(time_s, position_m, pressure_pa)
+            self._change_level(time_s, command_pa)
+        if self.rest is None and self._running_on:
+            self._from_m = max(self._from_m, position_m) if self._sense < 0 else min(self._from_m, position_m)
         self._position_m, self._interval_s, self._time_s = position_m, time_s - self._time_s, time_s
         if not arrived:
             self._level_s = time_s
@@ -230,8 +226,7 @@ class LandingDetector:
 
     def _waited_for(self, time_s: float, rest: Rest) -> bool:
         """Whether a stem that seems to rest has been waited for long enough."""
-        precise = rest.std_m <= PRECISE * self._stroke_m or rest.count >= LONG
-        return precise and time_s - self._level_s >= self._patience_s(rest)
+        return time_s - self._level_s >= self._patience_s(rest)
 
     def _under_its_command(self, rest: Rest) -> bool:
         """Whether a rest is one under the command in force; if not, what that did is not known, and is waited for."""
@@ -251,24 +246,14 @@ class LandingDetector:
             divisor_m = _common_divisor(step_m, self.quantum_m, self._finest_m)
             self.quantum_m = self._window.quantum_m = divisor_m
 
-    def _follow(self, time_s: float, position_m: float, pressure_pa: float) -> None:
-        """Follow a stem that moves or may yet move, and the pressure on its way."""
-        if self._running_on:
-            self._from_m = max(self._from_m, position_m) if self._sense < 0 else min(self._from_m, position_m)
-        if self._arrival.awaited:
-            self._arrival.add(time_s, pressure_pa)
-
-    def _change_level(self, time_s: float, command_pa: float, pressure_pa: float) -> None:
+    def _change_level(self, time_s: float, command_pa: float) -> None:
         """Begin to wait for what a change of the command does; the stem starts from its rest, or from where it is."""
-        step_pa = 0.0 if isnan(self._level_pa) else abs(command_pa - self._level_pa)
-        # Of a command that changes with each sample there is no arrival.
-        if time_s - self._level_s > ONE_SAMPLE * self._interval_s:
-            self._arrival.restart(time_s, pressure_pa, self._level_pa, command_pa, at_rest=self.rest is not None)
-        elif self._arrival.followed:
-            self._arrival.lost()
         if self.rest is None and not self._known and self._under_way and not self._late:
             self._learn_answer(time_s - self._level_s)
-        self._step_pa = step_pa if self.rest is not None else self._step_pa + step_pa
+        left_pa = (self._level_pa,) if self.rest is not None else (*self._left_pa, self._level_pa)
+        known_pa = [each_pa for each_pa in left_pa if not isnan(each_pa)]
+        self._left_pa = (min(known_pa), max(known_pa)) if known_pa else ()
+        self._step_pa = max((abs(command_pa - each_pa) for each_pa in known_pa), default=0.0)
         self._running_on = self.rest is None
         self._rested_pa = None if self.rest is None or isnan(self._level_pa) else self._level_pa
         self._from_m = nan if isnan(self._level_pa) else self._position_m if self.rest is None else self.rest.position_m
@@ -296,7 +281,6 @@ class LandingDetector:
             self._window.restart(time_s)
         else:
             self._learn_answer(time_s - self._level_s)
-            self._arrival.learn(time_s - self._level_s)
             self._window.look_again(time_s)
 
     def _learn_answer(self, answer_s: float) -> None:
@@ -317,7 +301,6 @@ class LandingDetector:
         creep_s = max(0.0, rest.came_to_rest_s - INSTANTS * self._interval_s)
         if moved:
             self._learn_answer(rest.came_to_rest_s)
-            self._arrival.learn(rest.came_to_rest_s)
         return SlideOutcome(
             time_s=self._clock_s,
             direction=self._sense,

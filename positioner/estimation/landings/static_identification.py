@@ -132,12 +132,14 @@ class StaticIdentification:
         position_m = supposed.rest.position_m
         if self._valve is not None:
             position_m = self._valve.stem_m(position_m, s or self.way)
-        down_pa, up_pa = (
-            local_balance.landing_pa(position_m, way, law.ratios, self.balances, self._stroke_m) for way in (-1, 1)
-        )
+        down_pa, up_pa = (local_balance.landing_pa(position_m, way, self._straight, self.balances) for way in (-1, 1))
         low_pa, high_pa = (up_pa if s > 0 else down_pa), (down_pa if s < 0 else up_pa)
         near_pa = AS_COMMANDED * -law.ratios.b_over_c * self._stroke_m
         return low_pa - near_pa <= supposed.command_pa <= high_pa + near_pa
+
+    @property
+    def _straight(self) -> local_balance.KnownLaw:
+        return local_balance.KnownLaw(self.law.ratios, self._stroke_m)
 
     def _of_stem(self, outcome: SlideOutcome, valve: ExtendedValve) -> SlideOutcome:
         """Return an outcome with the positions of the stem in place of those indicated."""
@@ -168,9 +170,9 @@ class StaticIdentification:
         if not law.valid or went_m > LONGEST_WAY * self._stroke_m:
             self._elsewhere = 0
             return False
-        should_m = local_balance.ahead_m(outcome, law.ratios, self.balances, self._stroke_m)
+        should_m = local_balance.ahead_m(outcome, self._straight, self.balances)
         should_m /= 1.0 - law.swing
-        scatter_m = local_balance.scatter_m(law.ratios, self.balances, self._stroke_m)
+        scatter_m = local_balance.scatter_m(self._straight, self.balances)
         allowed_m = max(LIKE * abs(should_m), OFF * self._stroke_m + 3.0 * (scatter_m + outcome.std_m))
         elsewhere = abs(went_m - should_m) > allowed_m
         if elsewhere and (gives := compliance(self.held, outcome.direction)) is not None and gives.explains(outcome):

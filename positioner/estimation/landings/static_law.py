@@ -36,7 +36,7 @@ from positioner.estimation.acceptance import Ratios
 from positioner.estimation.array import Array
 from positioner.estimation.estimates import Estimate, no_estimate
 from positioner.estimation.landings.landing_detector import SlideOutcome
-from positioner.estimation.landings.local_balance import bent_by_pa
+from positioner.estimation.landings.local_balance import KnownLaw, bent_by_pa
 from positioner.estimation.landings.parting import FINEST
 from positioner.estimation.landings.swing import balanced, swing_of
 
@@ -201,7 +201,8 @@ def _bent_by_pa(ratios: Ratios, slides: Sequence[SlideOutcome], stroke_m: float)
     """
     if ratios.b_over_c >= 0.0:
         return 0.0
-    off_pa = [[bent_by_pa(x * stroke_m, s, ratios, slides, stroke_m) for x in MIDDLE] for s in (1, -1)]
+    law = KnownLaw(ratios, stroke_m)
+    off_pa = [[bent_by_pa(x * stroke_m, s, law, slides) for x in MIDDLE] for s in (1, -1)]
     return max(sqrt(sum(each**2 for each in one) / len(one)) for one in off_pa)
 
 

@@ -10,17 +10,14 @@ With the stem at rest at x, e = r - x and s = sign(e):
                                     D = max(1.02 d_-s, d_s - abs(e))
 
 The first of two slides leaves the way between x and r by D: an excursion. It goes the other way round, by r - s D' with
-D' = max(1.02 d_s, d_-s + abs(e)), where it leaves the way between by less, D' - abs(e) < D, for turning and going on
-differ. Or where one of the two would leave the travel or the pressure limits. To 1.02 d comes what sensor and device
-round: a first slide that fell so much short would leave no way back.
+D' = max(1.02 d_s, d_-s + abs(e)), where a bound of the site, of the travel or of the pressure bars one of the two.
+To 1.02 d comes what sensor and device round: a first slide that fell so much short would leave no way back.
 
     c         how far a packing gives way, m/Pa        (packing_compliance.py)
 
 Where the packing gives way, a stem under p is moved directly, by u = p + e/c, as long as it holds at r:
 
     s (u - B(r, s))/κ <= 0.9 of the longest way that held
-
-Then a slide just long enough is a way back, too: by r + s (d_s - abs(e)), and on to r by the packing alone.
 """
 
 from dataclasses import dataclass
@@ -107,31 +104,15 @@ class Plan:
         holds = s * (command_pa - self.balance.pressure_pa(self.target_m, s)) <= held_m * -self.balance.ratios.b_over_c
         return command_pa if holds and self.bounds.allows(command_pa) else None
 
-    def taken_back_by_the_packing(self) -> list[Excursion]:
-        """Return the excursion from which the packing brings the stem back, if there is one."""
-        s = 1 if self.target_m > self.from_m else -1
-        by_m = self.from_m + s * self.way_m(s)
-        beyond_m = s * (by_m - self.target_m)
-        there_pa = self.balance.slide_pa(self.from_m, by_m, s)
-        gives = beyond_m > 0.0 and self.preslid_pa(by_m, there_pa) is not None
-        return [Excursion(direction=s, by_m=by_m, beyond_m=beyond_m)] if gives else []
-
-    def excursions(self, *, begun: bool) -> list[Excursion]:
-        """Return the excursions by either side, first the one that leaves the way between stem and target by less.
-
-        What a slide of the move has left beside its target is off that way already (begun), and while references keep
-        coming there is none: then it is the one that leaves the target by less.
-        """
+    @property
+    def excursions(self) -> tuple[Excursion, Excursion]:
+        """The excursions by either side, first by that of the target: the other takes longer."""
         error_m = self.target_m - self.from_m
         s, way_m = (1 if error_m > 0 else -1), abs(error_m)
         on_m = max(self.back_m(-s), self.way_m(s) - way_m)
         round_m = max(self.back_m(s), self.way_m(-s) + way_m)
         by_its_side = Excursion(direction=s, by_m=self.target_m + s * on_m, beyond_m=on_m)
-        by_the_other = Excursion(direction=-s, by_m=self.target_m - s * round_m, beyond_m=round_m - way_m)
-        leaves_m = round_m if begun else self.bounds.thresholds.other_side * by_the_other.beyond_m
-        both = [by_its_side, by_the_other] if on_m <= leaves_m else [by_the_other, by_its_side]
-        least_m = self.bounds.thresholds.loaded * both[0].beyond_m
-        return [*(each for each in self.taken_back_by_the_packing() if each.beyond_m <= least_m), *both]
+        return by_its_side, Excursion(direction=-s, by_m=self.target_m - s * round_m, beyond_m=round_m - way_m)
 
     def barred(self, each: Excursion) -> InhibitReason:
         """Return which bound of the site bars an excursion; `NOTHING`: none does."""

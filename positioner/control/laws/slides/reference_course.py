@@ -7,7 +7,8 @@ d_1, d_2, ... (the latest first; each at most `scan_s` after the one before) is 
 
 and the reference has come to rest when it has stood for 1.5 Δ. Until then, of an error e = r - x:
 
-    abs(e) <= 3 D                      left alone: the next references may take it back
+    abs(e) <= 3 D                      left alone: the next references may take it back; of references that go to and
+                                       fro, e is the least error that the last six have had
     e carried by N = 8 references      left alone: a ramp brings it within the reach of one slide, or back to the stem
     abs(e) <= m/2 on a ramp            left alone: single slides leave as much
     e^3 <= 3/2 m^2 T v on a ramp       left alone: two slides would cost more than they save
@@ -16,12 +17,6 @@ and the reference has come to rest when it has stood for 1.5 Δ. Until then, of 
 Two slides leave a ramp of v = D/Δ by m for T, the time until the second is given, and again whenever the error has
 come to e, each e/v: a mean square of e^2/3 + m^2 T v/e, which is least where e^3 = 3/2 m^2 T v. By hand, v = 0.13 %/s,
 m = 7.5 %, T = 0.5 s: e = 1.8 %, every 14 s.
-
-What two slides correct in a run that goes nowhere, abs(sum d_i) <= 0.7 sum abs(d_i), is the error from the median r_m
-of the last references: an excursion that lands at the reference of the moment lands a scatter off, and the next
-references ask for another one. Where one slide reaches the reference itself, it goes there. A small step within such a
-run is corrected when half of the references kept have confirmed it, or when it has come to rest. References as far
-apart as one slide goes, max r_i - min r_i >= m, are no scatter but steps to and fro, and each of them is meant.
 
 A ramp may be written more slowly than a DCS scans. Four steps alike, in one direction, each and each interval no more
 than twice the least, are one, and of its error is left alone what two slides would cost more than they save, as above.
@@ -38,7 +33,6 @@ that has gone as far as m since it turned is taken to go on by m/2, and no excur
 from dataclasses import dataclass
 from itertools import accumulate
 from operator import sub
-from statistics import median
 
 from positioner.control.laws.slides.slide_bounds import THRESHOLDS
 
@@ -111,23 +105,17 @@ class ReferenceCourse:
         """Whether the run is a ramp that has gone farther than a slide of way_m, the shortest."""
         return self.trend != 0 and self.turned_m is not None and abs(self.value_m - self.turned_m) >= way_m
 
-    def middle_m(self, now_s: float, way_m: float) -> float:
-        """Return r_m, m: what the references scatter about; of one that rests, goes somewhere, or steps, itself.
-
-        They step where they lie a slide of way_m, the shortest, or more apart.
-        """
-        net_m, sum_m = abs(sum(self.changes_m)), sum(abs(each) for each in self.changes_m)
-        if len(self.changes_m) < THRESHOLDS.a_trend or net_m > THRESHOLDS.goes_somewhere * sum_m or self.rests(now_s):
-            return self.value_m
-        last_m = tuple(accumulate(self.changes_m, sub, initial=self.value_m))
-        return median(last_m) if max(last_m) - min(last_m) < way_m else self.value_m
-
     def lead_m(self, now_s: float, way_m: float) -> float:
         """Return how far ahead of the reference, m, signed, a slide is to land, the shortest of which is way_m."""
         if self.rests(now_s):
             return 0.0
         coming_m = THRESHOLDS.coming * self.change_m
         return self.trend * (0.5 * way_m if self.goes_far(way_m) else min(0.5 * way_m, coming_m))
+
+    def _lasting_m(self, error_m: float) -> float:
+        """Return the least error that the last references had of a stem that is off by an error now, m."""
+        errors_m = tuple(accumulate(self.changes_m, sub, initial=error_m))
+        return max(0.0, min(errors_m), -max(errors_m))
 
     def takes_back(self, now_s: float, error_m: float, way_m: float, away_s: float) -> bool:
         """Whether an error r - x, m, is left to the references to come.
@@ -140,7 +128,8 @@ class ReferenceCourse:
         """
         if self.rests(now_s):
             return abs(error_m) ** 3 <= 1.5 * way_m**2 * away_s * self.slow_ramp_m_per_s(now_s)
-        if abs(error_m) <= THRESHOLDS.taken_back * self.change_m or self.goes_far(way_m):
+        lasting_m = abs(error_m) if self.trend else self._lasting_m(error_m)
+        if lasting_m <= THRESHOLDS.taken_back * self.change_m or self.goes_far(way_m):
             return True
         coming_m = THRESHOLDS.coming * self.change_m
         if self.trend * error_m < 0.0:

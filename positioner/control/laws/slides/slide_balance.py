@@ -1,7 +1,6 @@
 """What the law of slides knows of the valve: where a slide lands, and how break-away distances go over the travel.
 
-    B(x, s)    pressure under which a slide in direction s lands at x            (estimation/landings/local_balance.py;
-                                        of an extended valve, [law] valve:        extended_balance.py)
+    B(x, s)    pressure under which a slide in direction s lands at x            (estimation/landings/local_balance.py)
     φ, κ       friction and slope of B, as bent over the travel
     d_s        shortest slide that breaks loose in direction s, (F_s - F_c)/k_s
 
@@ -10,16 +9,15 @@ Where friction grows over the travel its static part grows alike, so d_s goes as
 
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
+from math import nan
 
 from config.extended_valve import ExtendedValve
 from positioner.control.laws.slides.slide_bounds import THRESHOLDS
 from positioner.estimation.acceptance import Ratios
 from positioner.estimation.landings.breakaway_distance import BreakawayDistance, Interval, Local
-from positioner.estimation.landings.extended_balance import extended_landing_pa
 from positioner.estimation.landings.landing_detector import VISIBLE, SlideOutcome
-from positioner.estimation.landings.local_balance import bent_by_pa, landing_pa, scatter_m, sliding_pa
+from positioner.estimation.landings.local_balance import KnownLaw, bent_by_pa, known_law, landing_pa, scatter_m
 from positioner.estimation.landings.packing_compliance import Compliance, compliance
-from positioner.estimation.landings.short_slides import ALIKE
 
 
 @dataclass(frozen=True, slots=True)
@@ -38,15 +36,16 @@ class Balance:
 
     def slide_pa(self, from_m: float, to_m: float, direction: int) -> float:
         """Return the pressure under which a slide from rest ends at a place, Pa: at its balance, or swung past it."""
-        if self.valve is None and not self.swing:
-            return sliding_pa(from_m, to_m, direction, self.ratios, self.landings, self.stroke_m)
-        return self.pressure_pa(to_m - self.swing * (to_m - from_m) if self.swing else to_m, direction)
+        return self.pressure_pa(to_m - self.swing * (to_m - from_m), direction, abs(to_m - from_m))
 
-    def pressure_pa(self, position_m: float, direction: int) -> float:
-        """Return B(x, s), Pa."""
-        if self.valve is not None:
-            return extended_landing_pa(position_m, direction, self.valve, self.landings, self.now_s)
-        return landing_pa(position_m, direction, self.ratios, self.landings, self.stroke_m)
+    def pressure_pa(self, position_m: float, direction: int, way_m: float = nan) -> float:
+        """Return B(x, s), Pa, of a slide that goes so far, m; NaN: as far as the landings did."""
+        return landing_pa(position_m, direction, self.known, self.landings, way_m)
+
+    @property
+    def known(self) -> KnownLaw:
+        """B without what landings say of it."""
+        return known_law(self.ratios, self.stroke_m, self.valve, self.now_s)
 
     def compliance(self, direction: int) -> Compliance | None:
         """Return how far the packing gives way in a direction; None: it does not."""
@@ -55,7 +54,7 @@ class Balance:
     def tried(self, way_m: float, direction: int) -> int:
         """Return how many of the last slides that landed in a direction were sent about so far, m."""
         sent_m = (self._sent_m(each) for each in self.landings if each.direction == direction)
-        return sum(abs(each_m - way_m) < ALIKE * way_m for each_m in sent_m)
+        return sum(abs(each_m - way_m) < THRESHOLDS.sent_alike * way_m for each_m in sent_m)
 
     @property
     def stops_m(self) -> tuple[float, float]:
@@ -65,11 +64,7 @@ class Balance:
     @property
     def scatter_m(self) -> float:
         """How far slides land off the balance, a standard deviation, m."""
-        return (
-            scatter_m(self.ratios, self.landings, self.stroke_m)
-            if self.valve is None
-            else THRESHOLDS.extended_known * self.stroke_m
-        )
+        return scatter_m(self.known, self.landings)
 
     @property
     def friction_m(self) -> float:
@@ -135,7 +130,6 @@ class Balance:
 
     def _shape_pa(self, position_m: float, direction: int) -> float:
         """Return B as it goes over the travel, Pa, without what only the last landings near a place say."""
-        if self.valve is not None:
-            return self.valve.landing_pa(position_m, direction)
-        bent_pa = bent_by_pa(position_m, direction, self.ratios, self.landings, self.stroke_m)
-        return self.ratios.balance_pa(position_m, direction) + bent_pa
+        return self.known.landing_pa(position_m, direction) + bent_by_pa(
+            position_m, direction, self.known, self.landings
+        )

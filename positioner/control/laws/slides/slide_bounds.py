@@ -19,6 +19,8 @@ class SlideThresholds:
     """Deviations of landings, by which it may, too: what scatters teaches nothing of break-away."""
     gave_way: float = 0.5
     """Of the way: a stem that went no farther was not broken loose, its packing gave way."""
+    sent_alike: float = 0.15
+    """Of the way: slides that were sent so nearly as far show the same of break-away."""
     far_short: float = 0.25
     """Of the way: no balance is so far off, so that a slide which falls so short has only begun to break loose."""
     longest_giving: float = 0.03
@@ -31,8 +33,6 @@ class SlideThresholds:
     """Of F_c/k_s: the first guess of a break-away distance, where neither a slide nor F_s has told one."""
     rounded_quanta: float = 0.5
     """Quanta by which a position may be rounded."""
-    other_side: float = 1.05
-    """Factor on how far an excursion by the other side leaves the way between: it takes longer."""
     no_farther: float = 2e-3
     """Of the stroke: a first slide that will go on by less has done its work ..."""
     watched_s: float = 0.02
@@ -49,9 +49,6 @@ class SlideThresholds:
     """Of the longest way that held, by which a packing is loaded beyond sliding friction: what gives way may creep."""
     preslid_within: float = 0.5
     """Of the error, which a packing must be known to leave, lest a slide be better."""
-    loaded: float = 0.5
-    """Of another excursion, for one from which the packing takes the stem back: it leaves it loaded, so that the next
-    move has less of it."""
     most_preslid: int = 4
     """Direct moves for one reference: each leaves a fraction of the error before it."""
     widening: float = 1.5
@@ -66,8 +63,6 @@ class SlideThresholds:
     """Slides in a row that hold, each as long as has broken loose: one may be luck, and friction grows."""
     middle: float = 0.5
     """Of the stroke: where break-away distances are kept."""
-    extended_known: float = 1e-3
-    """Of the stroke: how well an extended valve is known."""
     slope_reach: float = 0.1
     """Of the stroke, to either side: by what is between, a slope is known; by less, a landing amiss would bend it."""
     flattest: float = 0.25
@@ -80,8 +75,6 @@ class SlideThresholds:
     """Of the longest of their intervals: then no further one comes."""
     taken_back: float = 3.0
     """Mean changes, D: a stem so far off is not met by chance."""
-    goes_somewhere: float = 0.7
-    """Of the sum of all changes, without their signs: a run that goes so far goes somewhere."""
     coming: int = 8
     """References to come, N, that a ramp is counted on for."""
     a_trend: int = 3

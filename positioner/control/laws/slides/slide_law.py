@@ -129,8 +129,6 @@ def stepped(
     now = Now(seen, reference_m, balance, bounds)
     if seen.outcome is not None:
         memory = after_outcome(memory, seen.outcome, now)
-    if memory.course is not None and memory.course.changes_m:
-        now = now._replace(reference_m=asked_m(memory, memory.course, now))
     return after(memory, now)
 
 
@@ -140,21 +138,6 @@ def first_distances(balance: Balance, bounds: SlideBounds) -> BreakawayDistance:
     if bounds.breakaway_pa is not None:
         guess_m = max(guess_m, (bounds.breakaway_pa + balance.ratios.k_over_c) / -balance.ratios.b_over_c)
     return balance.first_distances(guess_m, told=told)
-
-
-def asked_m(memory: SlideMemory, course: ReferenceCourse, now: Now) -> float:
-    """Return where the stem is to be, m: the reference, or, where that takes two slides, what it scatters about.
-
-    A stem that stands on its reference stays there.
-    """
-    rest = now.seen.rest
-    stands_m = now.seen.position_m if rest is None else rest.position_m
-    error_m, plan = course.value_m - stands_m, now.plan(memory, stands_m)
-    ways_m = {s: plan.way_m(s, turning=True) for s in (1, -1)}
-    reached = not isinstance(memory.state, Out) and abs(error_m) >= ways_m[1 if error_m > 0 else -1]
-    if reached or abs(error_m) <= now.bounds.dead_band_m:
-        return course.value_m
-    return course.middle_m(now.seen.now_s, min(ways_m.values()))
 
 
 def balance_of(ratios: Ratios, statics: StaticIdentification, stroke_m: float, now_s: float) -> Balance:

@@ -37,7 +37,7 @@ from positioner.control.laws.slides.states import (
     slide_of,
 )
 from positioner.control.laws.slides.stem_observation import StemObservation
-from positioner.control.laws.slides.teaching import held, sent_elsewhere, slid_away
+from positioner.control.laws.slides.teaching import sent_elsewhere, slid_away
 from positioner.estimation.landings.landing_detector import STOP
 from positioner.estimation.landings.stem_at_rest import Rest
 
@@ -51,7 +51,6 @@ class Now(NamedTuple):
 
     seen: StemObservation
     reference_m: float
-    """What the move is to: the reference, or what references scatter about."""
     balance: Balance
     bounds: SlideBounds
 
@@ -180,23 +179,15 @@ def no_slide_left(memory: SlideMemory, now: Now) -> SlideMemory | None:
     return _barred(memory, now, InhibitReason.TRIM_ENDED) if ended else None
 
 
-def held_where_it_stands(memory: SlideMemory, now: Now) -> SlideMemory | None:
-    """Learn that the stem is held: it rests under the very pressure that one slide to the reference would be given."""
-    slide, reaches = _one_slide(memory, now)
-    rests = memory.command_pa == now.balance.slide_pa(slide.from_m, slide.to_m, slide.direction)
-    stuck = memory.row is not None and memory.row.stuck
-    return held(memory, slide, now) if reaches and rests and not stuck else None
-
-
 def one_slide(memory: SlideMemory, now: Now) -> SlideMemory | None:
     """Give the one slide that reaches the reference, or the second of two."""
     slide, reaches = _one_slide(memory, now)
     if not reaches:
         return None
     wanted_pa = now.balance.slide_pa(slide.from_m, slide.to_m, slide.direction)
-    if now.bounds.allowed_pa(wanted_pa) == memory.command_pa:  # what the stem does not do now it will not do then
-        limited = not now.bounds.allows(wanted_pa)
-        return _barred(memory, now, InhibitReason.LAW_BEYOND_LIMITS if limited else InhibitReason.TRIM_ENDED)
+    if now.bounds.allowed_pa(wanted_pa) == memory.command_pa:  # under which it rests: it holds the stem
+        beyond = not now.bounds.allows(wanted_pa)
+        return _barred(memory, now, InhibitReason.LAW_BEYOND_LIMITS) if beyond else None
     return _slide(memory, now, slide.from_m, slide.to_m, slide.direction)
 
 
@@ -255,8 +246,8 @@ def two_slides(memory: SlideMemory, now: Now) -> SlideMemory:
         return _barred(memory, now, InhibitReason.TRIM_ENDED)
     from_m = _standing_m(memory, now)
     plan, spent = now.plan(memory, from_m), memory.excursions
-    begun, reasons = memory.move.begun or bool(memory.course and memory.course.changes_m), []
-    for each in plan.excursions(begun=begun):
+    reasons = []
+    for each in plan.excursions:
         spent_m = (spent.spent_at_m(seen.now_s, bounds) if spent else 0.0) + 2 * each.beyond_m
         broke = 0.0 < day_m(bounds) < spent_m and not _left_away(memory, now)
         reasons.append(plan.barred(each) or (InhibitReason.EXCURSION_BUDGET_SPENT if broke else NOTHING))
@@ -416,7 +407,6 @@ AT_REST = (
     Rule(COMMANDING, there, (Idle,), "the stem is within the dead band"),
     Rule(COMMANDING, as_near_as_slides_land, (Idle,), "it is as near as slides land, or on its stop"),
     Rule(COMMANDING, no_slide_left, (Idle, Stuck), "the move has had its slides"),
-    Rule(COMMANDING, held_where_it_stands, (), "it rests under the pressure of the slide that it would be given: held"),
     Rule(COMMANDING, one_slide, (Sliding, Returning, Idle, Stuck), "the reference is farther than break-away"),
     Rule(COMMANDING, preslid, (Presliding,), "the packing gives way as far as the reference"),
     Rule(COMMANDING, taken_back, (Idle,), "references to come take the error back"),
@@ -427,12 +417,10 @@ TABLE = (*MOVING, *AT_REST)
 
 
 def after(memory: SlideMemory, now: Now) -> SlideMemory:
-    """Return the memory after the first rule that holds and leads to a state; one that leads to none only teaches."""
+    """Return the memory after the first rule that holds."""
     rest = now.seen.rest
     memory = memory if rest is None else settled(memory, now, rest)
     for rule in MOVING if rest is None else AT_REST:
         if isinstance(memory.state, rule.of) and (followed := rule.follow(memory, now)) is not None:
-            if rule.to:
-                return followed
-            memory = followed
+            return followed
     return on_its_way(memory, now)
