@@ -10,8 +10,9 @@ With the stem at rest at x, e = r - x and s = sign(e):
                                     D = max(1.02 d_-s, d_s - abs(e))
 
 The first of two slides leaves the way between x and r by D: an excursion. It goes the other way round, by r - s D' with
-D' = max(1.02 d_s, d_-s + abs(e)), where a bound of the site, of the travel or of the pressure bars one of the two.
-To 1.02 d comes what sensor and device round: a first slide that fell so much short would leave no way back.
+D' = max(1.02 d_s, d_-s + abs(e)), where it leaves the way between by less, D' - abs(e) < D, for turning and going on
+differ, or where a bound of the site, of the travel or of the pressure bars one of the two. To 1.02 d comes what sensor
+and device round: a first slide that fell so much short would leave no way back.
 
     c         how far a packing gives way, m/Pa        (packing_compliance.py)
 
@@ -106,13 +107,15 @@ class Plan:
 
     @property
     def excursions(self) -> tuple[Excursion, Excursion]:
-        """The excursions by either side, first by that of the target: the other takes longer."""
+        """The excursions by either side, first the one that leaves the way between stem and target by less."""
         error_m = self.target_m - self.from_m
         s, way_m = (1 if error_m > 0 else -1), abs(error_m)
         on_m = max(self.back_m(-s), self.way_m(s) - way_m)
         round_m = max(self.back_m(s), self.way_m(-s) + way_m)
         by_its_side = Excursion(direction=s, by_m=self.target_m + s * on_m, beyond_m=on_m)
-        return by_its_side, Excursion(direction=-s, by_m=self.target_m - s * round_m, beyond_m=round_m - way_m)
+        by_the_other = Excursion(direction=-s, by_m=self.target_m - s * round_m, beyond_m=round_m - way_m)
+        shorter = on_m <= self.bounds.thresholds.other_side * by_the_other.beyond_m
+        return (by_its_side, by_the_other) if shorter else (by_the_other, by_its_side)
 
     def barred(self, each: Excursion) -> InhibitReason:
         """Return which bound of the site bars an excursion; `NOTHING`: none does."""

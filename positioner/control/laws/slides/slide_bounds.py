@@ -33,6 +33,8 @@ class SlideThresholds:
     """Of F_c/k_s: the first guess of a break-away distance, where neither a slide nor F_s has told one."""
     rounded_quanta: float = 0.5
     """Quanta by which a position may be rounded."""
+    other_side: float = 1.05
+    """Factor on how far an excursion by the other side leaves the way between: it takes longer."""
     no_farther: float = 2e-3
     """Of the stroke: a first slide that will go on by less has done its work ..."""
     watched_s: float = 0.02
