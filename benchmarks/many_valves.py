@@ -12,6 +12,7 @@ hold: the cost of standing by.
 """
 
 import argparse
+import os
 import selectors
 import signal
 import socket
@@ -29,12 +30,13 @@ import psutil
 
 from config.codes import Fault
 from config.daemon_file import load_valves
+from config.errors import InputError
 from config.modbus_map import SIMULATED_MAP
 from fieldbus.modbus.layout import layout
 from positioner.cli.parts.children import port_in
 from positioner.daemon.cycle_load import in_memory_s
 from positioner.daemon.pacing import raise_above_cycles
-from positioner.dcs import Dcs
+from positioner.dcs import Dcs, DcsError
 
 GOALS = ((200, 10.0), (64, 100.0))
 SECONDS, WARM_UP_S = 20.0, 5.0
@@ -135,7 +137,7 @@ def measured(valves: int, rate_hz: float, seconds: float, processes: int | None 
         assert daemon.stdout is not None
         said = daemon.stdout.readline()
         if not said:
-            raise RuntimeError(Path(folder, "log").read_text())
+            raise InputError(" ".join(command), Path(folder, "log").read_text().strip())
         port = port_in(said.strip())
         time.sleep(WARM_UP_S)
         alone_s = in_memory_s(load_valves(file)[0])
@@ -190,8 +192,8 @@ def _machine_s() -> float:
     return float(sum(times) - times.idle - times.iowait)
 
 
-def main(words: Sequence[str] | None = None) -> None:
-    """Print the lines; with --devices be the devices."""
+def main(words: Sequence[str] | None = None) -> int:
+    """Print the lines; with --devices be the devices. Status 1: the machine was too busy for a figure."""
     parser = argparse.ArgumentParser(prog="python -m benchmarks.many_valves")
     parser.add_argument("--devices", action="store_true", help="be the devices, and say at which port")
     parser.add_argument("--valves", type=int)
@@ -202,8 +204,18 @@ def main(words: Sequence[str] | None = None) -> None:
     if given.devices:
         Devices().serve()
     goals = ((given.valves, given.rate_hz),) if given.valves else GOALS
-    print(*report(goals, given.seconds, given.processes), sep="\n", flush=True)
+    try:
+        print(*report(goals, given.seconds, given.processes), sep="\n", flush=True)
+    except (InputError, DcsError, subprocess.TimeoutExpired) as error:
+        print(f"benchmarks.many_valves: no figure: {error}; {busy()}", file=sys.stderr)
+        return 1
+    return 0
+
+
+def busy() -> str:
+    """Say how busy the machine is, which is why a daemon answers late."""
+    return f"{os.getloadavg()[0]:.0f} processes wait for {psutil.cpu_count()} processors"
 
 
 if __name__ == "__main__":
-    main()
+    sys.exit(main())

@@ -67,7 +67,10 @@ class HostAddress:
         return pending
 
     def _looked_up(self) -> Addresses:
-        return list(socket.getaddrinfo(self._host, self._port, 0, socket.SOCK_STREAM))
+        try:
+            return list(socket.getaddrinfo(self._host, self._port, 0, socket.SOCK_STREAM))
+        except UnicodeError:  # a label that is empty, or longer than any name server takes
+            raise socket.gaierror(socket.EAI_NONAME, "can be no name of a host") from None
 
 
 def _is_address(host: str) -> bool:

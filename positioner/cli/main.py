@@ -12,7 +12,8 @@ import os
 import select
 import sys
 from collections.abc import Sequence
-from typing import NoReturn
+from math import isfinite, nan
+from typing import Any, NoReturn
 
 NO_MORE_FILES = frozenset((errno.EMFILE, errno.ENFILE))
 
@@ -116,11 +117,33 @@ def _unread() -> bool:
 
 
 class OneLine(argparse.ArgumentParser):
-    """A parser that says what is wrong in one line, as every command does, without its usage before it."""
+    """A parser that says what is wrong in one line, as every command does, without its usage before it.
+
+    A number (`type=float`) is a finite one in every command: NaN passes comparisons that are to refuse it.
+    """
+
+    def __init__(self, *what: Any, **named: Any) -> None:
+        super().__init__(*what, **named)
+        self.register("type", float, _finite)
 
     def error(self, message: str) -> NoReturn:
         """End with it, and with the status of bad input."""
         self.exit(2, f"{self.prog}: {message}; `{self.prog} --help` says more\n")
+
+
+def _finite(text: str) -> float:
+    """Return a number that a word is.
+
+    Raises:
+        ArgumentTypeError: it is none, or not finite.
+    """
+    try:
+        value = float(text)
+    except ValueError:
+        value = nan
+    if not isfinite(value):
+        raise argparse.ArgumentTypeError(f"must be a finite number, got {text!r}")
+    return value
 
 
 def _understood(words: Sequence[str] | None) -> argparse.Namespace:

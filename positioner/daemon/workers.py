@@ -6,7 +6,8 @@
 A worker that ends, or whose cycles turn no more, is said and started anew, after a while that grows with its failures.
 What its valves do meanwhile their devices decide, by their own communication time-outs, as after the end of any daemon.
 It then begins as any daemon does: it holds what the device has, in mode hold. Until it serves again its units answer
-with exception 11, the device behind the gateway does not respond. A worker whose daemon is gone ends as if it was told.
+with exception 11, the device behind the gateway does not respond; so does one that a busy machine keeps from answering
+within `ANSWER_WITHIN_S`, until it has. A worker whose daemon is gone ends as if it was told.
 
 Both ends are this file; a worker is `python -P -m positioner.daemon.workers`.
 """
@@ -257,6 +258,7 @@ class Worker:
         calls.send(Call(call.unit, call.table, call.address, call.size, call.words, call.peer, self._counts.all))
         self._unanswered += 1
         if not calls.poll(ANSWER_WITHIN_S):
+            log_event(log, logging.WARNING, "a worker answers late", valves=self._names, waited_s=ANSWER_WITHIN_S)
             raise TimeoutError
         answer: Sequence[int] | ExcCodes = calls.recv()
         self._unanswered -= 1

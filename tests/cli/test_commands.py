@@ -1,5 +1,6 @@
 """The commands as a person meets them: help, bad input as one line, exit status."""
 
+import argparse
 import csv
 import errno
 import io
@@ -261,6 +262,19 @@ def test_words_that_no_command_takes_are_one_line(
 def test_bad_words_are_one_line_and_exit_status_2(words: list[str], said: str, capsys: Capture) -> None:
     assert main(words) == 2
     assert said in one_line(capsys)
+
+
+def test_no_command_takes_a_number_that_is_none() -> None:
+    """NaN passes a comparison that is to refuse it, so that no option of any command lets it in."""
+    commands = next(each for each in command_parser()._actions if isinstance(each, argparse._SubParsersAction))
+    parsers: dict[str, argparse.ArgumentParser] = commands.choices
+    options = [(parser, each) for parser in parsers.values() for each in parser._actions if each.type is float]
+    assert len(options) > 30
+    for parser, option in options:
+        assert parser._get_value(option, "1.5") == 1.5
+        for word in ("nan", "-inf", "1e400", "x"):
+            with pytest.raises(argparse.ArgumentError, match="must be a finite number"):
+                parser._get_value(option, word)
 
 
 def test_the_map_is_complete_in_every_format(capsys: Capture) -> None:

@@ -185,7 +185,7 @@ def test_the_stem_of_a_valve_from_a_data_sheet_goes_no_farther_than_its_travel(t
     [
         ({"--area-cm2": ["0"]}, "--area-cm2: must be above 0, at most 100000, it is 0"),
         ({"--range-bar": ["1", "0.2"]}, "--range-bar: must be two gauge pressures, the lower first"),
-        ({"--stroke-mm": ["nan"]}, "--stroke-mm: must be above 0"),
+        ({"--stroke-mm": ["0"]}, "--stroke-mm: must be above 0"),
     ],
 )
 def test_a_data_sheet_that_cannot_be_is_one_line(

@@ -8,6 +8,7 @@ from config.codes import InhibitReason, Ne107Cause, Ne107Status, State
 from config.loading import SHIPPED
 from config.slave_file import Initial, SlaveClock, load_slave
 from config.valve_file import ValveFile, load_valve, shipped_valve
+from positioner.cli.demo import by_steps_pu
 from positioner.daemon.health import ne107_condition
 from positioner.estimation.estimates import Directions
 from sim.effect import FINE_STEP_S
@@ -96,6 +97,17 @@ def test_the_first_move_the_other_way_lands_once_and_goes_on_from_there(effect: 
     assert (ratios.friction_pa(1) * AREA_M2, ratios.friction_pa(-1) * AREA_M2) == pytest.approx(
         UP_DOWN_N[effect], rel=0.02
     )
+
+
+@pytest.mark.parametrize("way", [0.07, 0.1])
+def test_a_first_move_is_left_off_by_less_than_the_papers_law_can_move(way: float) -> None:
+    """The stem slides by its own jump and the step that broke it loose: what the demo holds such a move to."""
+    loop, valve = excited_by_a_sine("preload", "daemon.toml", "seed")
+    stood = valve.position_m / STROKE_M
+    loop.refer_to(stood - way, 2.0)
+    assert loop.why is not InhibitReason.ONE_DIRECTION
+    assert stood - valve.position_m / STROKE_M > way / 2, "it has moved"
+    assert abs(valve.position_m / STROKE_M - (stood - way)) < by_steps_pu(SEED)
 
 
 def test_a_reference_back_the_known_way_ends_the_steps() -> None:

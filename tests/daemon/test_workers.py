@@ -144,7 +144,7 @@ def position_m(here: Workers, unit: int) -> int | None:
 
 
 def test_one_whose_cycles_stand_is_killed_and_started_again(
-    shared: tuple[Path, list[Share]], monkeypatch: pytest.MonkeyPatch
+    shared: tuple[Path, list[Share]], monkeypatch: pytest.MonkeyPatch, caplog: pytest.LogCaptureFixture
 ) -> None:
     monkeypatch.setattr(workers, "STANDS_S", 1.0)
     monkeypatch.setattr(workers, "SLOWEST_CYCLES", 0.0)
@@ -164,6 +164,9 @@ def test_one_whose_cycles_stand_is_killed_and_started_again(
         until(look(lambda: first.turns > 0 and second.turns > 0), "turns")
         pid = first._process.pid if first._process else 0
         os.kill(pid, signal.SIGSTOP)
+        caplog.clear()
+        assert [position_m(here, 1), position_m(here, 1)] == [None, None], "no answer in time is exception 11"
+        assert [each.message for each in caplog.records] == ["a worker answers late"], "said once, until it answers"
         until(look(lambda: is_gone(pid)), "the end of the one that stands")
         assert position_m(here, 1) is None
         assert position_m(here, 2) is not None, "the other answers"

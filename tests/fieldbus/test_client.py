@@ -157,3 +157,9 @@ def test_a_late_reply_is_not_read_after_opening_anew() -> None:
             read(client)
         first.close()
         second.close()
+
+
+@pytest.mark.parametrize("host", ["a..b", "x" * 300])
+def test_what_can_be_no_name_of_a_host_is_nobody(host: str) -> None:
+    with pytest.raises(NotConnected, match="can be no name of a host"):
+        ModbusClient(host, 502, 1, 1.0).open()

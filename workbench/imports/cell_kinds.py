@@ -59,7 +59,8 @@ def may_be_clock(cells: Sequence[Cell]) -> bool:
     if all(isinstance(cell, str) and re.search(r"\d:\d\d|\d{4}-\d\d-\d\d", cell) for cell in held):
         return True
     for decimal in ".,":
-        steps = np.diff(numbers_of(held, decimal))
+        with np.errstate(over="ignore"):  # 1e308 and its like are no clock
+            steps = np.diff(numbers_of(held, decimal))
         if np.isfinite(steps).all():
             return bool(steps.any()) and bool((steps >= 0).all() or (steps <= 0).all())
     return False
