@@ -23,13 +23,14 @@ from positioner.daemon.link import Link
 from positioner.daemon.pacing import DevicePace
 
 ON_THE_WIRE = 4.0
-"""Of the processor time in memory, that on a wire: frames, system calls, threads that hand the interpreter over.
-`python -m benchmarks.many_valves` prints it: 4 to 5 beside others that use the same processors."""
+"""Of the processor time in memory, that on a wire: frames, system calls, waiting for many descriptors at once.
+`python -m benchmarks.many_valves` prints it: 4 to 5 beside few others on the same processors, 6 to 7 beside many."""
 USABLE = 0.8
 """Of the processor: beyond it cycles wait for one another, and more than 1 % of the periods are missed."""
 MOST_LINES = 100
-"""Threads that cycle in one process: with 200 in one a cycle costs up to twice what it costs in two of 100 each, and
-more periods are missed (`python -m benchmarks.many_valves --processes 1`)."""
+"""Valves, or serial lines, of one process. A cycle costs the same in one of 200 as in two of 100 (314 and 356 us), but
+its one thread is held up for all of them at once: beside others 88 of 200 were found stalled, and none in two
+(`python -m benchmarks.many_valves --processes 1`)."""
 IMPOSSIBLE = 2.0
 """Of the processor: no busy moment while it was measured makes so much of a load that fits."""
 BATCHES, CYCLES = 6, 40
@@ -45,7 +46,7 @@ class CycleLoad:
         fastest_s: the shortest period among them.
         cost_s: processor time of a cycle.
         share: of one processor; 1 is all of it.
-        lines: number of threads that cycle.
+        lines: number of valves, those of a serial line as one.
         processes: that may share them, each with a processor of its own.
     """
 

@@ -8,7 +8,8 @@
     course        of a stem at rest, by how far it is outside what the identified valve allows under its command:
                   max(|x - (u - p_0) / k| - F_c / k, 0)          k = k_s / A, p_0 offset, F_c as a pressure
     short         command less measured pressure, of a command that stands, share of the span: a leak;
-    short, high   the same where the command is in the upper fifth: the supply
+    short, high   the same where the command is in the upper fifth of what the identified valve needs for its travel,
+                  or, of one that is not identified, of what its limits allow: the supply
     exhausted     air let out: the sum of the falls of the command over the pressure of the surroundings, in volumes of
                   the actuator
 
@@ -41,7 +42,7 @@ DEVIATIONS = (0.001, 0.002, 0.005, 0.01, 0.02, 0.05, 0.1)
 NEAR_LIMIT = 0.01
 """Of the span of the command."""
 SUPPLY = 0.8
-"""Of the span of the command, from where a shortage is the supply's."""
+"""Of the pressure that opens the valve, from where a shortage is the supply's."""
 RESTS = 0.002
 """Of the stroke, by which a stem that rests may seem to move in a second."""
 ENDS = 0.02
@@ -178,7 +179,8 @@ class Operation:
             changes["course"] = day.course.with_one(outside_m / self._travel.stroke_m)
         short_pa = command_pa - sample.pressure_pa
         if isfinite(short_pa) and short_pa != 0.0:  # to the digit: the device measures none, and the command is shown
-            high = command_pa >= low_pa + SUPPLY * (high_pa - low_pa)
+            most_pa = high_pa if ratios is None else min(high_pa, ratios.balance_pa(self._travel.stroke_m, 1))
+            high = command_pa >= low_pa + SUPPLY * (most_pa - low_pa)
             name = "short_high" if high else "short"
             changes[name] = getattr(day, name).with_one(short_pa / (high_pa - low_pa))
         return changes

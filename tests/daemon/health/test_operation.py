@@ -10,7 +10,9 @@ import numpy as np
 import pytest
 
 from config.codes import EndTrend, Mode
+from config.daemon_file import load_daemon
 from config.errors import InputError
+from config.loading import SHIPPED
 from config.travel import Travel
 from fieldbus.modbus.server import RegisterServer
 from positioner.cli.main import main
@@ -70,6 +72,20 @@ def test_a_command_at_its_limit_a_leak_a_poor_supply_and_a_stem_beside_its_cours
     turned = Turned((1, *NOT_TURNED.spans[1:]), 2 * 101_325.0)
     operation.look(sample, decision, turned, 0.0)
     assert (operation.today.span[0], operation.today.exhausted) == pytest.approx((1, 2.0))
+
+
+def test_a_poor_supply_is_seen_by_commands_that_the_valve_needs_however_far_the_limits_are() -> None:
+    """The shipped file allows 420 kPa, of which its valve never needs more than 105 before it is pressed shut."""
+    file = load_daemon(SHIPPED / "profiles" / "daemon.toml")
+    _, sample, decision = in_automatic()
+    limits_pa = (file.pressure.minimum_pa, file.pressure.maximum_pa)
+    for ratios, short, high in ((Ratios(-814.5e3, -22.07e3), 1, 1), (None, 2, 0)):
+        operation = Operation(Travel(file.valve.stroke_m), limits_pa)
+        now = decision._replace(applied=replace(decision.applied, ratios=ratios))
+        for command_pa in (70e3, 70e3, 95e3, 95e3):
+            seen = sample._replace(position_m=0.05, pressure_pa=command_pa - 5e3)
+            operation.look(seen, now._replace(command_pa=command_pa), NOT_TURNED, 0.0)
+        assert (operation.today.short.count, operation.today.short_high.count) == (short, high)
 
 
 def test_spans_go_from_turn_to_turn() -> None:
