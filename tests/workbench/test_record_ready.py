@@ -32,6 +32,11 @@ def test_a_sound_recording_has_nothing_to_tell() -> None:
     assert record.valid.all()
 
 
+def test_what_an_import_assumed_is_told_wherever_the_recording_is_held_against_a_model() -> None:
+    said = "command_pa in %: 0 % is 0.2 bar, 100 % 1 bar, for nobody has said it"
+    assert f"assumed: {said}" in ready(Recording(plain(), {"assumed": said, "imported": "so"})).notes
+
+
 def test_a_gap_a_clock_set_back_and_unrecorded_rows_begin_new_segments() -> None:
     columns = plain()
     columns["time_s"] = columns["time_s"].copy()

@@ -27,6 +27,8 @@ from workbench.data.clocks import Doubt, early, unled
 from workbench.data.noise_floor import UNKNOWN, noise_std_m, not_repeating_m, repeatability_m, said_noise_m
 from workbench.data.pressure_lag import without_gaps_pa
 
+TOLD = ("torn", "assumed")
+"""What a recording's file says that belongs to every result: it was broken off, an end of a range is a guess."""
 GAP_PERIOD_QUANTILES = 10.0
 """A gap is longer than this many times the 95 % quantile of the periods: unevenly logged data have none by that."""
 UNEVEN = 0.05
@@ -131,7 +133,7 @@ def ready(recording: Recording) -> Record:
     """
     columns = recording.columns
     _require_columns(columns)
-    notes = [f"{key}: {value}" for key, value in recording.metadata.items() if key == "torn" or key.startswith("not ")]
+    notes = [f"{key}: {value}" for key, value in recording.metadata.items() if key in TOLD or key.startswith("not ")]
     asked = "reference_m" if recording.by_setpoint else "command_pa"
     command_pa = _held(_without_words(columns[asked], asked, recording.kind is VALVE, notes), asked, notes)
     position_m = recording.position_m

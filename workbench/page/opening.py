@@ -178,6 +178,5 @@ def mapped(export: Export, by: ColumnChoice) -> Opened:
 
 
 def wrong_with(opened: Opened, stroke_m: float | None) -> tuple[str, ...]:
-    """Say what is wrong with a recording, a line each: what was assumed, what is odd, and what was left out or cut."""
-    assumed = [f"assumed: {each}" for key, each in opened.recording.metadata.items() if key == "assumed"]
-    return (*assumed, *oddities(opened.recording, stroke_m), *shortened(opened.record.notes))
+    """Say what is wrong with a recording, a line each: what is odd, what was assumed, and what was left out or cut."""
+    return (*oddities(opened.recording, stroke_m), *shortened(opened.record.notes))
