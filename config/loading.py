@@ -42,12 +42,12 @@ Port = Annotated[int, Field(ge=1, le=65535)]
 def between(least: float, most: float, *, or_zero: bool = False) -> AfterValidator:
     """Let a number be in a range, both ends included, or 0 where that means none; what is allowed is said at once."""
 
-    def checked(value: float) -> float:
+    def check(value: float) -> float:
         if not (least <= value <= most or (or_zero and value == 0)):
             raise ValueError(f"allowed is {'0, or ' if or_zero else ''}{least:g} to {most:g}")
         return value
 
-    return AfterValidator(checked)
+    return AfterValidator(check)
 
 
 Stroke = Annotated[float, between(1e-9, 1e6)]
@@ -75,12 +75,12 @@ def _named(path: str) -> str:
 def wide(least: float, *, either_way: bool = False) -> AfterValidator:
     """Let two ends be so far apart, the lower one first unless `either_way`."""
 
-    def checked(ends: tuple[float, float]) -> tuple[float, float]:
+    def check(ends: tuple[float, float]) -> tuple[float, float]:
         if (abs(ends[1] - ends[0]) if either_way else ends[1] - ends[0]) < least:
             raise ValueError(f"must be at least {least:g} wide{'' if either_way else ', the lower end first'}")
         return ends
 
-    return AfterValidator(checked)
+    return AfterValidator(check)
 
 
 T = TypeVar("T")

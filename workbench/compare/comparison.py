@@ -21,7 +21,7 @@ from config.valve_file import ValveFile
 from signals.moves import Slip, slips
 from sim.composition import Composition
 from workbench.compare.comparison_sentences import Findings, Stretch, judged, shortened
-from workbench.compare.friction_balance import Forces, FrictionBalance, balance, forces, joined
+from workbench.compare.friction_balance import Forces, FrictionBalance, balance, forces, join_forces
 from workbench.compare.measures import fit_percent, rms, robust, valid_rows
 from workbench.compare.phases import PHASES, phases
 from workbench.compare.residuals import (
@@ -269,7 +269,8 @@ def compare_record(record: Record, valve: ValveFile) -> Comparison:
         input_correlation=with_input,
         spectrum=spectrum(even[1], period_s),
         friction=balance(
-            joined([each.measured_forces for each in segments]), joined([each.model_forces for each in segments])
+            join_forces([each.measured_forces for each in segments]),
+            join_forces([each.model_forces for each in segments]),
         ),
         by_setpoint=record.by_setpoint,
         kind=valve.valve.kind,

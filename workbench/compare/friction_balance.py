@@ -60,7 +60,7 @@ def forces(
     return Forces(*(each[moving] for each in every))
 
 
-def joined(parts: Sequence[Forces]) -> Forces:
+def join_forces(parts: Sequence[Forces]) -> Forces:
     """Return the forces of several stretches as one."""
     return Forces(*(np.concatenate([getattr(part, each.name) for part in parts]) for each in fields(Forces)))
 

@@ -18,7 +18,7 @@ from config.valve_file import ValveFile
 from sim.composition import BASE, Composition
 from sim.karnopp import Vector
 from workbench.compare.comparison import Comparison, compare_record
-from workbench.compare.friction_balance import Forces, forces, joined
+from workbench.compare.friction_balance import Forces, forces, join_forces
 from workbench.compare.measures import rms, valid_rows
 from workbench.data.record import Record, require_units
 from workbench.model.free_run import FreeRun, Run
@@ -178,7 +178,7 @@ class LiveModel:
         run = self._run.run(self._effective())
         measured = [self._forces(run, self.record.position_m, each) for each in self.record.segments]
         model = [self._forces(run, run.indicated_m, each) for each in self.record.segments]
-        return joined(measured), joined(model)
+        return join_forces(measured), join_forces(model)
 
     def _forces(self, run: Run, position_m: Column, segment: tuple[int, int]) -> Forces:
         rows = slice(*segment)
