@@ -4,7 +4,7 @@ VENV   := .venv
 BIN    := $(VENV)/bin
 READY  := $(VENV)/.ready
 
-.PHONY: venv demo test suite long lint browser bench campaign fuzz kills endurance blind moved mutants journey locked sbom release-check docs clean
+.PHONY: venv demo test suite long lint browser bench campaign fuzz kills endurance blind moved thresholds mutants journey locked sbom release-check docs clean
 
 venv: $(READY)
 
@@ -62,6 +62,9 @@ blind: $(READY)         ## hours, can be broken off: what is missing of the blin
 
 moved: $(READY)         ## hours, can be broken off: what the workbench says of the kept cases otherwise than before
 	$(BIN)/python -m benchmarks.blind --moved build/moved.jsonl
+
+thresholds: $(READY)    ## hours for all, a sample by default: what a diagnosis says when a threshold is changed by 30 %
+	$(BIN)/python -m benchmarks.thresholds
 
 mutants: $(READY)       ## hours for all, a sample by default: changes of constants and branches that no test sees
 	$(BIN)/python -m benchmarks.mutants

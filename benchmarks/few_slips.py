@@ -255,7 +255,7 @@ def said(seed: int) -> tuple[str, bool, bool]:
     return f"{what} {floors:6.2f} floors {seconds:6.1f} s", alone, in_set
 
 
-def given(seed: int) -> tuple[str, bool]:
+def fit_true_effect(seed: int) -> tuple[str, bool]:
     """Return a line on the fit of a record of a seed with its true effect, and whether it is at the noise."""
     effects = ((), *((name,) for name in EFFECTS))[seed % (1 + len(EFFECTS))]
     hidden, sheet = drawn(seed, effects), load_valve(find_valve("seed"))
@@ -278,7 +278,7 @@ def main() -> None:
     first = in_set = 0
     seeds = range(asked.first_seed, asked.first_seed + asked.records)
     if asked.given:
-        fits = [given(seed) for seed in seeds]
+        fits = [fit_true_effect(seed) for seed in seeds]
         print(*(line for line, _ in fits), sep="\n")
         print(f"at the noise: {sum(at_noise for _, at_noise in fits)} of {len(fits)}")
         return
