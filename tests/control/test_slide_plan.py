@@ -31,10 +31,17 @@ TURNING_IS_SHORT = replace(PLAN, distances=BreakawayDistance(LONG, LONG, SHORT, 
 
 def test_an_excursion_goes_by_the_shorter_way_round() -> None:
     """By its side it would go on by 1 % of the stroke; round the other it turns, by half of that."""
-    first, other = TURNING_IS_SHORT.excursions
+    first, other = TURNING_IS_SHORT.excursions(begun=False)
     assert (first.direction, other.direction) == (-1, 1)
     assert first.by_m == pytest.approx(0.06 - 5.5e-3)
     assert first.beyond_m == pytest.approx(5e-3), "half a millimetre of it is the way between"
+
+
+@pytest.mark.parametrize(("begun", "direction"), [(False, -1), (True, 1)])
+def test_the_shorter_way_round_leaves_what_lies_between_stem_and_reference_least(begun: bool, direction: int) -> None:
+    """A stem that a slide of the move has left there is off the way already."""
+    plan = replace(TURNING_IS_SHORT, from_m=0.057, anchor=Anchor(0.057, 1))
+    assert plan.excursions(begun=begun)[0].direction == direction
 
 
 def test_the_way_back_has_room_for_what_sensor_and_device_round() -> None:
@@ -46,14 +53,14 @@ def test_the_way_back_has_room_for_what_sensor_and_device_round() -> None:
 
 
 def test_each_bound_bars_an_excursion() -> None:
-    up, _down = PLAN.excursions
+    up, _down = PLAN.excursions(begun=False)
     assert PLAN.barred(up) is InhibitReason.NOTHING
     near = replace(PLAN, bounds=replace(SETTINGS, excursion_limit_m=1e-3))
     assert near.barred(up) is InhibitReason.EXCURSION_BEYOND_LIMIT
     beyond = replace(PLAN, target_m=0.0985)
-    assert {beyond.barred(each) for each in beyond.excursions} >= {InhibitReason.EXCURSION_BEYOND_LIMIT}
+    assert {beyond.barred(each) for each in beyond.excursions(begun=False)} >= {InhibitReason.EXCURSION_BEYOND_LIMIT}
     low = replace(PLAN, target_m=(FRICTION_PA - 1e3) / SLOPE_PA_PER_M, from_m=0.027, anchor=None)
-    assert {low.barred(each) for each in low.excursions} == {InhibitReason.LAW_BEYOND_LIMITS}
+    assert {low.barred(each) for each in low.excursions(begun=False)} == {InhibitReason.LAW_BEYOND_LIMITS}
 
 
 @pytest.mark.parametrize(

@@ -105,17 +105,20 @@ class Plan:
         holds = s * (command_pa - self.balance.pressure_pa(self.target_m, s)) <= held_m * -self.balance.ratios.b_over_c
         return command_pa if holds and self.bounds.allows(command_pa) else None
 
-    @property
-    def excursions(self) -> tuple[Excursion, Excursion]:
-        """The excursions by either side, first the one that leaves the way between stem and target by less."""
+    def excursions(self, *, begun: bool) -> tuple[Excursion, Excursion]:
+        """Return the excursions by either side, first the one that leaves the way between stem and target by less.
+
+        What a slide of the move has left beside its target is off that way already (begun), and while references keep
+        coming there is none: then it is the one that leaves the target by less.
+        """
         error_m = self.target_m - self.from_m
         s, way_m = (1 if error_m > 0 else -1), abs(error_m)
         on_m = max(self.back_m(-s), self.way_m(s) - way_m)
         round_m = max(self.back_m(s), self.way_m(-s) + way_m)
         by_its_side = Excursion(direction=s, by_m=self.target_m + s * on_m, beyond_m=on_m)
         by_the_other = Excursion(direction=-s, by_m=self.target_m - s * round_m, beyond_m=round_m - way_m)
-        shorter = on_m <= self.bounds.thresholds.other_side * by_the_other.beyond_m
-        return (by_its_side, by_the_other) if shorter else (by_the_other, by_its_side)
+        leaves_m = round_m if begun else self.bounds.thresholds.other_side * by_the_other.beyond_m
+        return (by_its_side, by_the_other) if on_m <= leaves_m else (by_the_other, by_its_side)
 
     def barred(self, each: Excursion) -> InhibitReason:
         """Return which bound of the site bars an excursion; `NOTHING`: none does."""
