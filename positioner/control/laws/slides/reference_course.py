@@ -8,7 +8,7 @@ d_1, d_2, ... (the latest first; each at most `scan_s` after the one before) is 
 and the reference has come to rest when it has stood for 1.5 Δ. Until then, of an error e = r - x:
 
     abs(e) <= 3 D                      left alone: the next references may take it back; of references that go to and
-                                       fro, e is the least error that the last six have had
+                                       fro, e is the least error that the last three have had
     e carried by N = 8 references      left alone: a ramp brings it within the reach of one slide, or back to the stem
     abs(e) <= m/2 on a ramp            left alone: single slides leave as much
     e^3 <= 3/2 m^2 T v on a ramp       left alone: two slides would cost more than they save
@@ -114,7 +114,7 @@ class ReferenceCourse:
 
     def _lasting_m(self, error_m: float) -> float:
         """Return the least error that the last references had of a stem that is off by an error now, m."""
-        errors_m = tuple(accumulate(self.changes_m, sub, initial=error_m))
+        errors_m = tuple(accumulate(self.changes_m[: THRESHOLDS.a_trend - 1], sub, initial=error_m))
         return max(0.0, min(errors_m), -max(errors_m))
 
     def takes_back(self, now_s: float, error_m: float, way_m: float, away_s: float) -> bool:
