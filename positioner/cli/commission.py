@@ -18,6 +18,10 @@ WARNING = (
     "The valve will go from end to end, several times, for some four minutes. Whatever it controls must bear that: "
     "isolate it first."
 )
+NOT_THERE = (
+    "is not there: write it, with [valve] name, [device] host, port and unit, and [pressure] maximum_pa, as in "
+    "config/profiles/daemon.toml"
+)
 STROKE_UNKNOWN_M = 1.0
 """Stands in a file that says no stroke yet, until one is found."""
 
@@ -69,13 +73,15 @@ def _file(path: Path, name: str | None) -> "DaemonFile":
     """Return the file, which may lack the stroke.
 
     Raises:
-        InputError: as `load_daemon`, or it has several valves.
+        InputError: there is none, which says what to write; as `load_daemon`, or it has several valves.
     """
     from config.daemon_file import DaemonFile, load_daemon
     from config.errors import InputError
     from config.file_kinds import require_kind
     from config.loading import read_toml, validated
 
+    if not path.exists():
+        raise InputError(str(path), NOT_THERE)
     tables: dict[str, Any] = read_toml(path)
     if isinstance(tables.get("valve"), list):
         load_daemon(path, name)

@@ -20,7 +20,7 @@ import numpy as np
 
 from config.daemon_file import DaemonFile
 from config.results.block import Table, as_text
-from positioner.tests_on_the_valve.kept_records import KINDS, MEANS, Change, Record, change_table, changes
+from positioner.tests_on_the_valve.kept_records import AT_ITS_RATE, KINDS, MEANS, Change, Record, change_table, changes
 from positioner.tests_on_the_valve.outcome import Curve, Picture, Quantity
 from positioner.tests_on_the_valve.thresholds import THRESHOLDS
 
@@ -110,16 +110,21 @@ class ValveReport:
         return [each for each in tables if each.rows]
 
     def findings(self) -> list[str]:
-        """Return what the figures mean that have changed since the factory or, without one, until as left, in words."""
-        return [
-            f"{test}, {TITLES[after.kind]}: {each.means} ({each.quantity.text} {each.quantity.shown}, "
-            f"{TITLES[before.kind]} {each.before.shown})"
-            for test in self.tests()
-            for before, after, changed in self.compared(test)
-            if before.kind == "factory" or "factory" not in self.kept(test)
-            for each in changed
-            if each.changed and each.means
-        ]
+        """Return what the figures mean that have changed since the factory or, without one, until as left, in words.
+
+        A line each, with the figures of every test that shows it.
+        """
+        shown: dict[str, list[str]] = {}
+        for test in self.tests():
+            for before, after, changed in self.compared(test):
+                if before.kind == "factory" or "factory" not in self.kept(test):
+                    for each in changed:
+                        if each.changed and each.means:
+                            told = (
+                                f"{each.quantity.text} {each.quantity.shown}, {TITLES[before.kind]} {each.before.shown}"
+                            )
+                            shown.setdefault(f"{TITLES[after.kind]}: {each.means}", []).append(f"{test}: {told}")
+        return [f"{means} ({'; '.join(figures)})" for means, figures in shown.items()]
 
     def _value(self, quantity: Quantity) -> float | None:
         told = {**self.by_file, **self._factory, **self.recommended}
@@ -130,7 +135,7 @@ class ValveReport:
         """What the factory's newest records say of what a technician looks at, by name."""
         left = [each.outcome for each in self.records if each.kind == "factory"]
         told = {each.name: each.figure.value for outcome in left for each in outcome.quantities}
-        looked_at = MEANS.keys() | self.by_file.keys()
+        looked_at = (MEANS.keys() | self.by_file.keys()) - AT_ITS_RATE
         return {name: value for name, value in told.items() if name in looked_at and value is not None}
 
     def _shown(self, quantity: Quantity | None) -> str:

@@ -106,7 +106,8 @@ class Record:
     def told(self) -> str:
         """What it is, in a few words."""
         when = datetime.fromtimestamp(self.time_s, UTC)
-        return f"{self.kind.replace('_', ' ') or 'test'} of {when:%Y-%m-%d %H:%M} UTC"
+        kind = f"{self.kind.replace('_', ' ')} record" if self.kind else "test"
+        return f"{kind} of {when:%Y-%m-%d %H:%M} UTC"
 
 
 def keep(folder: Path, outcome: Outcome, kind: str, time_s: float, configuration: Mapping[str, Any]) -> Path:
@@ -179,11 +180,16 @@ def _rates_differ(*outcomes: Outcome) -> bool:
 def change_table(told: Sequence[Change], since: str) -> Table:
     """Return what has changed as a table, what has not left out."""
     rows = [
-        (each.quantity.text, each.before.shown, each.quantity.shown, f"{each.deviations:+.3g}", each.means)
+        (each.quantity.text, each.before.shown, each.quantity.shown, f"{each.deviations:+.3g}")
         for each in told
         if each.changed
     ]
-    return Table(("figure", "before ", "now ", "deviations", ""), rows, f"changed since the {since}")
+    return Table(("figure", "before ", "now ", "deviations"), rows, f"changed since the {since}")
+
+
+def meaning_table(told: Sequence[Change]) -> Table:
+    """Return what changes may mean, a line each, in the technician's words."""
+    return Table(("what it may mean",), [(each.means,) for each in told if each.changed and each.means])
 
 
 def trend(told: Sequence[Record], names: Sequence[str]) -> Table:
@@ -197,8 +203,8 @@ def trend(told: Sequence[Record], names: Sequence[str]) -> Table:
             figures[each].shown if each in figures and figures[each].figure.reason is None else "-" for each in names
         ]
         when = datetime.fromtimestamp(record.time_s, UTC)
-        rows.append((f"{when:%Y-%m-%d %H:%M}", *cells, record.kind.replace("_", " "), record.outcome.said))
-    headings = ("UTC", *(texts.get(each, each) + " " for each in names), "", "")
+        rows.append((f"{when:%Y-%m-%d %H:%M}", record.outcome.said, record.kind.replace("_", " "), *cells))
+    headings = ("UTC", "", "", *(texts.get(each, each) + " " for each in names))
     return Table(headings, rows, f"the last {len(shown)} of {len(told)}")
 
 

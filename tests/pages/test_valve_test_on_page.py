@@ -55,7 +55,7 @@ def played(page: Page, site: Site) -> None:
     page.get_by_test_id("answer-begin").click()
     expect(page.get_by_test_id("break-off-test")).to_be_visible()
     expect(page.get_by_test_id("said")).to_contain_text("partial stroke test of FV-1: passed")
-    expect(page.get_by_test_id("test-said")).to_contain_text("kept as as found")
+    expect(page.get_by_test_id("test-said")).to_contain_text("kept (as found)")
     with site.dcs() as dcs:
         assert dcs.get("experiment_consent") == 0
     with page.expect_download() as taken:

@@ -98,7 +98,7 @@ class Findings(HTMLParser):
 
     def named(self, when: str, words: str) -> bool:
         """Return whether a line about the valve as found or as left has these words."""
-        return any(f", {when}: " in line and words in line for line in self.lines)
+        return any(line.startswith(f"{when}: ") and words in line for line in self.lines)
 
 
 def test_the_defects_are_named_in_the_report_and_the_mended_valve_is_as_it_was(tmp_path: Path) -> None:

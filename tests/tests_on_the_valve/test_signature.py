@@ -188,7 +188,7 @@ def test_the_command_reads_recordings_and_moves_nothing(tmp_path: Path, capsys: 
     assert "a signature goes over the whole travel, allowed is [0, 1]" in capsys.readouterr().err
     assert main([*words, "--config", str(site), "--keep", "as_left"]) == 0
     assert main([*words, "--config", str(site)]) == 0
-    assert "nothing has changed since the as left of" in capsys.readouterr().out
+    assert "nothing has changed since the as left record of" in capsys.readouterr().out
 
 
 @pytest.mark.parametrize("bits", [None, 12], ids=["as it reads", "1 % noise, 12 bits"])

@@ -200,7 +200,7 @@ def finished(
         draw(outcome, arguments.picture)
     if file is not None and (arguments.keep is not None or always_kept):
         path = kept(outcome, file, arguments, arguments.keep or "")
-        print(f"kept{'' if arguments.keep is None else f' as {arguments.keep}'.replace('_', ' ')}: {path}")
+        print(f"kept{'' if arguments.keep is None else f' ({arguments.keep})'.replace('_', ' ')}: {path}")
     return 0 if outcome.passed else 1
 
 
@@ -208,7 +208,7 @@ def _compared(outcome: "Outcome", before: "Record | None") -> "tuple[Outcome, li
     from dataclasses import replace
 
     from config.codes import ValveTestVerdict
-    from positioner.tests_on_the_valve.kept_records import change_table, changes
+    from positioner.tests_on_the_valve.kept_records import change_table, changes, meaning_table
 
     if before is None:
         return outcome, []
@@ -216,7 +216,11 @@ def _compared(outcome: "Outcome", before: "Record | None") -> "tuple[Outcome, li
     if not any(each.changed for each in told):
         return replace(outcome, notes=(*outcome.notes, f"nothing has changed since the {before.told}")), told
     others = tuple(each for each in outcome.verdicts if each is not ValveTestVerdict.PASSED)
-    tables = (*outcome.tables, change_table(told, before.told))
+    tables = (
+        *outcome.tables,
+        change_table(told, before.told),
+        *([meant] if (meant := meaning_table(told)).rows else []),
+    )
     return replace(outcome, verdicts=(*others, ValveTestVerdict.CHANGED), tables=tables), told
 
 

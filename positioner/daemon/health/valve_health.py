@@ -192,10 +192,13 @@ class Health:
         under_way = self._pressed_s <= sample.now_s < self._pressed_s + self.settings.settle_s
         asked_m = sent_to_m(decision.cut_off, decision.reference_m, sample.position_m)
         self.away_m = abs(sample.position_m - asked_m) if follows and not under_way else 0.0
-        self.left_away_m = self.away_m if self._stands(sample, decision.reference_m) else 0.0
+        self.left_away_m = self.away_m if self._stands(sample, decision.reference_m if follows else nan) else 0.0
 
     def _stands(self, sample: Sample, reference_m: float) -> bool:
-        """Whether the stem has stood still, but for noise, under a reference, m, for as long as moves settle."""
+        """Whether the stem has stood still, but for noise, under a reference, m, for as long as moves settle.
+
+        NaN: it follows none, and has not stood yet when it follows one again.
+        """
         at_m, asked_m, since_s = self._stood
         if not (reference_m == asked_m and abs(sample.position_m - at_m) <= self._travel.band_m):
             self._stood, since_s = (sample.position_m, reference_m, sample.now_s), sample.now_s
