@@ -3,7 +3,7 @@
     held    v = 0 whatever the forces                                 until the onset of a move
     loose   m v' = F_e - F_v v - F_c sigma, from rest if |F_e| > F_c  to the last sample that the record shows in motion
             once it has been faster than `FAST` v_s by the law of `sim.karnopp`, with Stribeck's term, until it sticks
-    after it the stem slides until it stops, and is held again
+    after it the stem slides by that law until it stops, and is held again: with F_c alone a ramp carried it on
 
 x stem position, m; v velocity, m/s; F_e external force, F_c sliding friction, N, with all effects as in `sim.karnopp`.
 Static friction has no part in when it moves. What it would have to be is told beside it: with F_s' = g F_s + d what the
@@ -152,7 +152,7 @@ def carried(
             if rested or abs(x - place) <= blur:
                 most = max(most, load(valve, Stem(t0, x, 0.0, p0), blur, not held, q, z))
             stays = held and not (rested and gives_way(free, Stem(t0 + s, x, 0.0, p), blur, q, z))
-            law = free if creeps or fast > 0.0 or held != stays else valve
+            law = free if held or creeps or fast > 0.0 else valve
             drive = Drive(t0, p0, (p - p0) / s)
             x, v, mode, sigma, indicated = follow(law, drive, s, x, v, p, mode, sigma, tolerance, stays, q, z)
             if mode == STUCK:

@@ -87,9 +87,10 @@ async def add_valve(server: Server, spaces: Namespaces, event_type: Node, place:
         device, valve, "SignalSet", ua.QualifiedName("SignalSet", spaces.padim), SIGNAL_SET_TYPE, spaces
     )
     await _add_signals(server, signals, valve, place, spaces)
-    await _add_numbers(device, valve)
+    turns = place.settings is not None and place.settings.valve.kind.turns
+    await _add_numbers(device, valve, turns=turns)
     await _add_states(device, valve)
-    await _add_estimates(device, valve)
+    await _add_estimates(device, valve, turns=turns)
     await _variable(device, valve, IDENTIFICATION, "none was asked for here yet", ua.VariantType.String)
     await _add_methods(server, device, valve, spaces)
     await device.add_reference(event_type, ua.ObjectIds.GeneratesEvent)
@@ -158,12 +159,12 @@ async def _scale(server: Server, valve: ValveSpace, path: str, unit: str, span: 
             await signal.add_property(valve.node_id(f"{path}.{name}"), ua.QualifiedName(name, 0), value)
 
 
-async def _add_numbers(device: Node, valve: ValveSpace) -> None:
+async def _add_numbers(device: Node, valve: ValveSpace, *, turns: bool) -> None:
     for folder, names in NUMBERS.items():
         parent = await device.add_folder(valve.node_id(folder), ua.QualifiedName(folder, valve.index))
         for name, register in names.items():
             node = await _variable(parent, valve, f"{folder}.{name}", 0.0, ua.VariantType.Double)
-            await _add_unit(node, valve, f"{folder}.{name}", unit_of(register))
+            await _add_unit(node, valve, f"{folder}.{name}", unit_of(register, turns=turns))
 
 
 async def _add_states(device: Node, valve: ValveSpace) -> None:
@@ -177,12 +178,12 @@ async def _add_states(device: Node, valve: ValveSpace) -> None:
     await _variable(parent, valve, "Status.Connection", "", ua.VariantType.String)
 
 
-async def _add_estimates(device: Node, valve: ValveSpace) -> None:
+async def _add_estimates(device: Node, valve: ValveSpace, *, turns: bool) -> None:
     parent = await device.add_folder(valve.node_id("Estimates"), ua.QualifiedName("Estimates", valve.index))
     for register, name in ESTIMATES.items():
         path = f"Estimates.{name}"
         node = await _variable(parent, valve, path, 0.0, ua.VariantType.Double)
-        await _add_unit(node, valve, path, unit_of(f"{register}_e"))
+        await _add_unit(node, valve, path, unit_of(f"{register}_e", turns=turns))
         await _variable(node, valve, f"{path}.StandardDeviation", 0.0, ua.VariantType.Double)
         await _variable(node, valve, f"{path}.Refusal", "", ua.VariantType.String)
 

@@ -5,6 +5,7 @@ nobody knows, is no value with the reason as its status: nothing old is passed o
 """
 
 import math
+import re
 from collections.abc import Iterator
 from enum import Enum
 from typing import NamedTuple
@@ -131,6 +132,11 @@ def state_texts(register: str) -> dict[int, str]:
     return {int(each): code_text(register, each) for each in CODES[register]}
 
 
-def unit_of(register: str) -> str:
-    """Return a register's unit, `1` of a plain number."""
-    return BY_NAME[register].unit
+def unit_of(register: str, *, turns: bool) -> str:
+    """Return a register's unit, `1` of a plain number; of a valve that turns, rad in place of m.
+
+    >>> unit_of("b_over_c_e", turns=True), unit_of("missed_periods", turns=True)
+    ('Pa/rad', '1')
+    """
+    unit = BY_NAME[register].unit
+    return re.sub(r"\bm\b", "rad", unit) if turns else unit

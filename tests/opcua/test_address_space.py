@@ -8,6 +8,7 @@ from xml.etree import ElementTree
 import pytest
 from asyncua import Node, Server, ua
 
+from config.daemon_file import DaemonFile
 from northbound.observer.watched_valves import Place
 from northbound.opcua.address_space import NODESETS, OURS, ValveSpace, add_valve, load_types
 from northbound.opcua.valve_nodes import HEALTH, SETPOINT, SIGNAL
@@ -66,6 +67,20 @@ def made() -> Iterator[tuple[Server, ValveSpace, asyncio.AbstractEventLoop]]:
     server, valve = loop.run_until_complete(make())
     yield server, valve, loop
     loop.close()
+
+
+@pytest.mark.parametrize(("valve", "unit"), [({"stroke_m": 0.04}, "Pa/m"), ({"travel_deg": 90.0}, "Pa/rad")])
+def test_what_is_counted_by_the_travel_has_the_unit_of_the_valves_own(valve: dict[str, float], unit: str) -> None:
+    async def said() -> str:
+        server = Server()
+        await server.init()
+        spaces, event_type = await load_types(server)
+        settings = DaemonFile.model_validate({"valve": {"name": "FV-102", **valve}})
+        space = await add_valve(server, spaces, event_type, Place("FV-102", "127.0.0.1", 1, 1, settings=settings))
+        node = server.get_node(space.node_id("Estimates.BOverC.EngineeringUnits"))
+        return str((await node.read_value()).DisplayName.Text)
+
+    assert asyncio.run(said()) == unit
 
 
 def test_every_mandatory_child_of_its_types_is_there(

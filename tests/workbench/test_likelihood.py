@@ -6,8 +6,9 @@ import numpy as np
 import pytest
 
 from config.recording import Column, Recording
-from config.valve_file import ValveFile
+from config.valve_file import ValveFile, load_valve, shipped_valve
 from sim.composition import COULOMB, STATIC, Composition
+from tests.simulated import simulated
 from tests.workbench.valves import NOISE_M, SEED, record_of, with_effect
 from workbench.data.record import Record, ready
 from workbench.fit.fitting import fit
@@ -60,6 +61,18 @@ def test_told_when_it_moves_the_true_valve_leaves_the_noise(file: ValveFile) -> 
         assert np.sqrt(np.mean(each**2)) < 1.25
     assert np.sqrt(np.mean(groups.landings**2)) < 2.0
     assert groups.break_aways.max(initial=0.0) < 2.0
+
+
+def test_a_ramp_does_not_carry_on_a_stem_that_is_told_to_rest() -> None:
+    """Without Stribeck's term it slid from slip to slip, 10 noises away from a stem that sticks."""
+    valve = load_valve(shipped_valve("ordinary"))
+    time_s = np.arange(0.0, 20.0, 0.03)
+    up_and_down_pa = 60e3 + 2.3e3 * (10.0 - np.abs(time_s - 10.0))
+    record = ready(simulated(valve, time_s, up_and_down_pa, noise_std_m=4e-5, seed=1))
+    like = likelihood(valve, record)
+    _, groups = with_onsets(like, like.composition.theta)
+    assert len(like.moves) > 30
+    assert np.sqrt(np.mean(groups.landings**2)) < 2.0
 
 
 def test_static_friction_has_no_part_in_when_a_told_stem_moves() -> None:

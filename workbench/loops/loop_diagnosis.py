@@ -127,11 +127,11 @@ class LoopDiagnosis(Result):
         )
 
     def _law(self) -> str:
-        law = self.law
+        law, acts = self.law, ACTS[self.law.action]
         if not law.seen:
-            return f"controller: no PI law is seen in the output ({100 * law.explained:.0f} % of its changes)"
+            return f"controller: {acts}; no PI law is seen in the output ({100 * law.explained:.0f} % of its changes)"
         return (
-            f"controller: gain {law.gain:.3g} % a unit of PV, reset time {law.reset_s:.4g} s, "
+            f"controller: {acts}; gain {law.gain:.3g} % a unit of PV, reset time {law.reset_s:.4g} s, "
             f"{100 * law.explained:.0f} % of the output's changes"
         )
 
@@ -161,7 +161,12 @@ class LoopDiagnosis(Result):
             "period_s": self.oscillation.period_s,
             "regularity": self.oscillation.regularity,
             "variance_cost": self.variance_cost,
-            "controller": {"gain": self.law.gain, "reset_s": self.law.reset_s, "explained": self.law.explained},
+            "controller": {
+                "gain": self.law.gain,
+                "reset_s": self.law.reset_s,
+                "explained": self.law.explained,
+                "action": self.law.action,
+            },
             "insufficient": [{"code": g.code, "says": g.says, "instead": g.instead} for g in self.gates],
             "remedies": [
                 {"name": r.name, "settings": r.settings, "error_ratio": r.error_ratio, "travel_ratio": r.travel_ratio}
@@ -187,6 +192,12 @@ class LoopDiagnosis(Result):
 
 
 REMEDIES = "Of now, simulated on the identified loop (– where that does not swing as the record does):"
+ACTS = {
+    1: "reverse acting, OP falls as PV rises",
+    -1: "direct acting, OP rises as PV rises",
+    0: "its action does not show, both signs of the process are tried",
+}
+"""By the sign that the process's gain then has."""
 OPEN = "a record with larger moves, or 20 more cycles, would tell; so would the stem's own position"
 
 

@@ -1,5 +1,6 @@
 """Drawn loops with truth, by equations that are not the product's (`workbench.bench.drawn_loops`)."""
 
+from collections.abc import Callable
 from dataclasses import replace
 
 import numpy as np
@@ -81,13 +82,38 @@ def test_lines_that_a_historian_drew_are_seen() -> None:
     assert "compressed" in [each.code for each in diagnose_loop(drawn).gates]
 
 
-def test_reversed_action_and_other_units_change_nothing() -> None:
-    record = record_of(draw_loop(10, "sticks"))
+def turned_pv(record: LoopRecord) -> LoopRecord:
     assert record.sp is not None
-    turned = replace(record, pv=500.0 - 7.0 * record.pv, sp=500.0 - 7.0 * record.sp)
-    found, again = diagnose_loop(record), diagnose_loop(turned)
-    assert found.law.action == -again.law.action == 1
+    return replace(record, pv=500.0 - 7.0 * record.pv, sp=500.0 - 7.0 * record.sp)
+
+
+def turned_op(record: LoopRecord) -> LoopRecord:
+    return replace(record, op_pct=100.0 - record.op_pct)
+
+
+@pytest.mark.parametrize("turned", [turned_pv, turned_op], ids=["process falls with OP", "OP in % of closing"])
+def test_reversed_action_is_said_and_changes_nothing_else(turned: Callable[[LoopRecord], LoopRecord]) -> None:
+    record = record_of(draw_loop(10, "sticks"))
+    found, again = diagnose_loop(record), diagnose_loop(turned(record))
+    assert (found.law.action, again.law.action) == (1, -1)
+    assert "reverse acting" in found.summary()
+    assert "direct acting" in again.summary()
     assert found.probability == pytest.approx(again.probability, rel=1e-3)
+    assert found.causes is not None
+    assert again.causes is not None
+    assert again.causes.friction.stiction_pct == pytest.approx(found.causes.friction.stiction_pct, rel=1e-3)
+    assert np.sign(again.causes.gain) == -np.sign(found.causes.gain)
+
+
+@pytest.mark.parametrize("seed", [10, 16])
+def test_the_sign_of_feedback_is_known_where_the_law_shows_and_never_guessed(seed: int) -> None:
+    """An output that does not hang on the control error has no action; both signs are tried, and that is said."""
+    record = record_of(draw_loop(seed, "sticks"))
+    elsewhere = replace(record, op_pct=record_of(draw_loop(seed + 1, "external noise")).op_pct[: record.pv.size])
+    short = replace(elsewhere, pv=record.pv[: elsewhere.op_pct.size], sp=None)
+    found = diagnose_loop(short)
+    assert found.law.action == 0
+    assert "its action does not show" in found.summary()
 
 
 def test_of_two_tags_of_different_rates_only_that_is_said() -> None:
