@@ -299,14 +299,14 @@ def test_a_stem_that_stands_6_percent_away_is_never_good_whatever_the_law_says(
     assert (ne107_condition(silent, panel.health).status is Ne107Status.GOOD) == (not missed)
 
 
-@pytest.mark.parametrize("before", [{"state": State.S3_IDENTIFY}, {"mode": Mode.MANUAL}])
-def test_a_stem_that_was_held_elsewhere_on_purpose_has_not_been_left_there(before: dict[str, object]) -> None:
+@pytest.mark.parametrize(("state", "mode"), [(State.S3_IDENTIFY, Mode.AUTOMATIC), (State.S0_START, Mode.MANUAL)])
+def test_a_stem_that_was_held_elsewhere_on_purpose_has_not_been_left_there(state: State, mode: Mode) -> None:
     """A test ended, and "away from the reference" was latched though the law had commanded for one cycle."""
     panel, sample, decision = in_automatic()
     away = decision._replace(reference_m=sample.position_m + 0.5 * STROKE_M)
     for number in range(3000):
         now = sample._replace(now_s=sample.now_s + 1e-3 * number)
-        panel.health.enter(now, away._replace(**before), panel.cycle.requests)
+        panel.health.enter(now, away._replace(state=state, mode=mode), panel.cycle.requests)
     panel.health.enter(now._replace(now_s=now.now_s + 1e-3), away, panel.cycle.requests)
     assert ne107_condition(away, panel.health).causes == ()
 
