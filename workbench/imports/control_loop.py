@@ -15,7 +15,7 @@ told from a stem by what is known of it:
 """
 
 import re
-from collections.abc import Mapping, Sequence
+from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass
 
 import numpy as np
@@ -97,6 +97,21 @@ def loops_of(columns: Sequence[LoopColumn]) -> list[LoopColumns]:
                 LoopColumns(tag, output.name, value.name, setpoint.name if setpoint else None, position, because)
             )
     return found
+
+
+def stem_by_name(names: Iterable[str]) -> str | None:
+    """Return which column is called as a stem's position is; None: none."""
+    return next((each for each in names if rank_by_name("position_m", each) in (0, 1)), None)
+
+
+def loop_by_names(names: Sequence[str]) -> tuple[str, str] | None:
+    """Return output and process value as they are called, whatever their numbers; None where one of them is not there.
+
+    >>> loop_by_names(["Time", "FIC7.SP", "FIC7.PV", "FIC7.OP"])
+    ('FIC7.OP', 'FIC7.PV')
+    """
+    found = [next((each for each in names if is_called(words, each)), None) for words in (OUTPUT, PROCESS_VALUE)]
+    return (found[0], found[1]) if found[0] and found[1] else None
 
 
 def _is_stem(column: LoopColumn) -> bool:

@@ -16,7 +16,7 @@ from config.errors import InputError
 from workbench.imports.cell_kinds import may_be_clock, numbers_of, with_any_unit
 from workbench.imports.clock_groups import find_groups
 from workbench.imports.column_clock import clock_of
-from workbench.imports.control_loop import LEAST_SHARE, MOST_SHARE, LoopColumns
+from workbench.imports.control_loop import LEAST_SHARE, MOST_SHARE, LoopColumns, loop_by_names, stem_by_name
 from workbench.imports.export_preview import ExportPreview, preview
 from workbench.imports.export_units import UNITS
 from workbench.imports.file_kind import raw_tables
@@ -193,13 +193,21 @@ def _recognised(path: Path, roles: dict[str, str]) -> LoopColumns | None:
         tags = ", ".join(each.tag for each in found.loops)
         raise InputError(str(path), f"holds {len(found.loops)} loops, {tags}: {say}")
     loop = found.loops[0] if found.loops else None
-    if loop is None and not {"op", "pv"} <= set(roles):
-        raise InputError(str(path), f"no loop is recognised by names and ranges: {say}")
-    if loop is not None and loop.position and not roles:
+    columns = [each.name for each in found.columns]
+    stem = stem_by_name(columns) if loop is None else loop.position
+    if stem and not roles:
         raise InputError(
-            str(path),
-            f"{loop.position!r} is a stem's position: `positioner diagnose` reads it; for the loop alone {say}",
+            str(path), f"{stem!r} is a stem's position: `positioner diagnose` reads it; for the loop alone {say}"
         )
+    if loop is None and not {"op", "pv"} <= set(roles):
+        if called := loop_by_names(columns):
+            op, pv = called
+            raise InputError(
+                str(path),
+                f"{op!r} is called an output and is no share in %: say what it has at 0 % and 100 %, as "
+                f"--op {op} --pv {pv} --op-range 0 27648",
+            )
+        raise InputError(str(path), f"no loop is recognised by names and ranges: {say}")
     known = _mode_and_time(found)
     if loop is not None:
         known |= {"op": loop.output, "pv": loop.process_value} | ({"sp": loop.setpoint} if loop.setpoint else {})

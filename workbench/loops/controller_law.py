@@ -44,7 +44,8 @@ def see_law(record: LoopRecord) -> ControllerLaw:
     scale = np.maximum(unknowns.std(axis=0), 1e-12)
     found = np.linalg.lstsq(unknowns / scale, changes, rcond=None)[0]
     left = changes - unknowns / scale @ found
-    explained = 1.0 - float(left @ left / max(float(changes @ changes), 1e-300))
+    changed = float(changes @ changes)
+    explained = 1.0 - float(left @ left) / changed if changed > 0.0 else 0.0
     gain, integral = (found / scale).tolist()
     action = int(np.sign(found.sum())) if explained > ACTION_SHOWS else 0
     reset_s = gain / integral * record.period_s if gain * integral > 0.0 else float("inf")

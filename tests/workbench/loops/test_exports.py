@@ -136,6 +136,12 @@ def counted(*periods: int) -> Callable[[int], str]:
         ("Zeit;FIC101.PV;FIC101.MV", lambda row: f"{row};{100 + row};4{row % 9},125", "--decimal"),
         ("Time,FIC101.PV,FIC101.OP,FV101.ZT", counted(7, 9, 8), "positioner diagnose"),
         ("Time,FIC1.PV,FIC1.OP,LIC2.PV,LIC2.OP", counted(7, 9, 5, 8), "holds 2 loops, FIC1, LIC2"),
+        ("time_s,command_pa,position_m", counted(7, 9), "positioner diagnose"),
+        (
+            "Time,FIC101.PV,FIC101.OP",
+            lambda row: f"{row},{50 + row % 9},{9000 + 10 * (row % 7)}",
+            "--op FIC101.OP --pv FIC101.PV --op-range 0 27648",
+        ),
         ("Time,FIC101.PV", counted(7), "no loop is recognised"),
     ],
 )

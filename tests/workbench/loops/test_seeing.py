@@ -38,6 +38,11 @@ def test_the_controllers_law_is_seen_in_its_output() -> None:
     assert law.reset_s == pytest.approx(20.0, rel=0.02)
 
 
+def test_an_output_that_stands_shows_no_law() -> None:
+    law = see_law(LoopRecord("L", 0.0, 0.5, np.full(TIME.size, 40.0), 50.0 + SINE))
+    assert (law.seen, law.explained, law.action) == (False, 0.0, 0)
+
+
 def test_each_method_of_the_literature_tells_its_own_shape() -> None:
     assert (he(TRIANGLE, 40.0).says, he(SINE, 40.0).says) == ("sticks", "no")
     assert (hagglund(SQUARE, 40.0).says, hagglund(SINE, 40.0).says) == ("sticks", "no")
