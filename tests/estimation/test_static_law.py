@@ -178,6 +178,20 @@ def test_the_residual_says_how_far_a_bent_valve_lands_off_where_there_were_no_la
     assert abs(off_m) < 3 * law.residual_m
 
 
+def test_what_the_last_slides_missed_alike_everywhere_is_corrected_everywhere() -> None:
+    """Friction has grown by 300 Pa since: the last slides up, far apart, say so for a place that none has been to."""
+    ratios = Ratios(-SLOPE, -UP)
+    before = [(x, s, 0.0) for x in np.linspace(0.02, 0.08, 8) for s in (1, -1)]
+    lately = [(x, 1, 300.0) for x in (0.08, 0.02, 0.065)]
+    landings = [
+        SlideOutcome(float(i), s, 0.0, SLOPE * x + s * UP + off, x, 1e-6, True, True)
+        for i, (x, s, off) in enumerate([*before, *lately])
+    ]
+    found = landing_pa(0.045, 1, KnownLaw(ratios, STROKE_M), landings[::-1]) - (SLOPE * 0.045 + UP)
+    assert 60.0 < found < 330.0  # without: 13 Pa
+    assert abs(landing_pa(0.045, -1, KnownLaw(ratios, STROKE_M), landings[::-1]) - (SLOPE * 0.045 - UP)) < 60.0
+
+
 @pytest.mark.parametrize("rho", [0.0, 0.02, 0.3])
 def test_a_stem_that_swings_past_its_balance_has_its_law_all_the_same(rho: float) -> None:
     """r = 0.43 of a damping ratio of 0.26: of slides of 2 to 12 % each sticks up to 3.6 % past its balance."""

@@ -1,18 +1,20 @@
 """The pressure that lands a slide at a position: a law known before, bent as landings are, and what is left near it.
 
-    B(x, s) = B_0(x, s) + q_1 + q_2 s + q_3 t + q_4 t^2 + q_5 t^3 + q_6 s t + (q_7 + q_8 s) v + n_s(x)
+    B(x, s) = B_0(x, s) + q_1 + q_2 s + q_3 t + q_4 t^2 + q_5 t^3 + q_6 s t + (q_7 + q_8 s) v + l_s + n_s(x)
     B_0     = κ x + s φ + offset of the straight law, or p_s(x) of an extended valve      (config/extended_valve.py)
     t       = 2 x/stroke - 1
     v       = (least way of the landings / way)^2, 1 at the most, less its mean over the landings
     q       = (Q' W Q/σ^2 + P^-1)^-1 Q' W e/σ^2             e_j = p_j - B_0(x_j, s_j)
-    n_s(x)  = Σ w_j e'_j / (w_0 + Σ w_j)                    e'_j what q leaves of e_j,  s_j = s
+    l_s     = what q leaves of all of the last e_j, s_j = s: the least of them if they have one sign, else 0
+    n_s(x)  = Σ w_j e'_j / (w_0 + Σ w_j)                    e'_j what q and l_s leave of e_j,  s_j = s
     w_j     = exp(-((x_j - x) / h)^2 / 2) ρ^(landings of direction s since j)
 
 A spring that hardens bends both lines alike (t^2, t^3), friction that grows over the travel makes them part (s t): two
 or three numbers, which the landings of S3 give. P holds them to what such valves have; W, Huber's, counts a landing
 that lies apart for less, and σ is what the others lie off by. Behind a slow I/P a slide creeps into its rest and sticks
 short of its balance; a short one jumps there: v. A slide to x that missed all the same says what is missing there: the
-next one lands. w_0 holds that correction back where there is little to go by. Where friction is known to drift by r a
+next one lands. w_0 holds that correction back where there is little to go by. Friction that drifts makes the last
+slides miss alike everywhere: l_s. Where friction is known to drift by r a
 second, p_j is what it would take now, p_j + s r (t - t_j) (p_+(x_j) - p_-(x_j))/2.
 
 All of this together stays among what was seen, B - B_0 within min(0, e_j) to max(0, e_j): no bend is carried on beyond
@@ -40,6 +42,8 @@ FADING = 0.7
 """ρ"""
 HELD_BACK = 0.1
 """w_0"""
+LATEST_LANDINGS = 3
+"""Landings in a direction, of which l_s is taken."""
 BENDS = (0.05, 0.05, 0.05, 0.1, 0.04, 0.03, 0.02, 0.02)
 """Of the pressure over the stroke: standard deviations of q, the root of P."""
 SAME = 1e-9
@@ -132,6 +136,8 @@ class _Bend(NamedTuple):
     """Of the landings from one to the next, a standard deviation: friction that drifts is gone by, and no scatter."""
     left: tuple[tuple[tuple[float, float], ...], ...]
     """Down and up, the latest first: x_j, m, and what q leaves of e_j."""
+    lately_pa: tuple[float, ...]
+    """l_s"""
     least_pa: float
     most_pa: float
     """Of e_j, and 0."""
@@ -141,13 +147,13 @@ class _Bend(NamedTuple):
         return min(max(off_pa, self.least_pa), self.most_pa)
 
     def near_pa(self, position_m: float, direction: int, width_m: float) -> float:
-        """Return n_s(x), Pa."""
-        weighted_pa, weights, age = 0.0, HELD_BACK, 1.0
+        """Return l_s + n_s(x), Pa."""
+        weighted_pa, weights, age, lately_pa = 0.0, HELD_BACK, 1.0, self.lately_pa[direction > 0]
         for at_m, left_pa in self.left[direction > 0]:
             apart = (at_m - position_m) / width_m
             weight = age * exp(-apart * apart / 2.0)
-            weighted_pa, weights, age = weighted_pa + weight * left_pa, weights + weight, age * FADING
-        return weighted_pa / weights
+            weighted_pa, weights, age = weighted_pa + weight * (left_pa - lately_pa), weights + weight, age * FADING
+        return lately_pa + weighted_pa / weights
 
     def bent_by_pa(self, share: float, direction: int, way_m: float = nan) -> float:
         """Return what q says at a share of the stroke, Pa, of a slide that goes so far, m; NaN: as landings did."""
@@ -166,7 +172,7 @@ def _bend(law: KnownLaw, landings: tuple[SlideOutcome, ...]) -> _Bend:
     """Return what landings say."""
     stroke_pa = -law.ratios.b_over_c * law.stroke_m
     if not landings:
-        return _Bend(_STRAIGHT, 0.0, 0.0, FINEST * stroke_pa, ((), ()), 0.0, 0.0)
+        return _Bend(_STRAIGHT, 0.0, 0.0, FINEST * stroke_pa, ((), ()), (0.0, 0.0), 0.0, 0.0)
     e = np.array([law.off_pa(each) for each in landings])
     s = np.array([float(each.direction) for each in landings])
     t = np.array([2.0 * each.position_m / law.stroke_m - 1.0 for each in landings])
@@ -188,6 +194,7 @@ def _bend(law: KnownLaw, landings: tuple[SlideOutcome, ...]) -> _Bend:
     left_pa = e - Q @ q
     at_m = np.array([each.position_m for each in landings])
     left = tuple(tuple(zip(at_m[s == way].tolist(), left_pa[s == way].tolist(), strict=True)) for way in (-1, 1))
+    lately_pa = tuple(_alike(left_pa[s == way][:LATEST_LANDINGS].tolist()) for way in (-1, 1))
     scatter_pa = max(FINEST * stroke_pa, _scatter_pa(left_pa[s == way] for way in (-1, 1)))
     return _Bend(
         tuple(q.tolist()),
@@ -195,6 +202,7 @@ def _bend(law: KnownLaw, landings: tuple[SlideOutcome, ...]) -> _Bend:
         mean_v,
         scatter_pa,
         left,
+        lately_pa,
         min(0.0, float(e.min())),
         max(0.0, float(e.max())),
     )
@@ -204,3 +212,10 @@ def _scatter_pa(ways_pa: Iterable[Array]) -> float:
     """Return by what slides scatter, a standard deviation, from what successive ones in each direction differ by."""
     apart_pa = np.abs(np.concatenate([np.diff(each) for each in ways_pa]))
     return 1.4826 * float(np.median(apart_pa)) / sqrt(2.0) if apart_pa.size else 0.0
+
+
+def _alike(missed_pa: Sequence[float]) -> float:
+    """Return what all have in common: the least of them, if all have one sign."""
+    if len(missed_pa) < LATEST_LANDINGS:
+        return 0.0
+    return max(0.0, min(missed_pa)) + min(0.0, max(missed_pa))
