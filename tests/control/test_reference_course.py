@@ -50,7 +50,7 @@ def test_a_ramp_that_goes_farther_than_a_slide_is_followed_by_single_slides_ahea
     assert course.takes_back(now_s, 0.99 * WAY_M, WAY_M, 0.5)
     assert course.takes_back(now_s, -0.99 * WAY_M, WAY_M, 0.5)
     assert not course.takes_back(now_s + 0.8, 0.99 * WAY_M, WAY_M, 0.5), "it has ended"
-    short, now_s = written([0.06 + 5e-4 * i for i in range(9)])
+    short, now_s = written([0.06 + 5e-4 * i for i in range(5)])
     assert not short.goes_far(WAY_M)
     turned = course.after(now_s + 0.5, 0.064)
     assert not turned.goes_far(WAY_M)
@@ -80,8 +80,8 @@ def test_a_ramp_is_led_by_half_a_way_and_carries_what_it_reaches(s: int) -> None
     assert course.takes_back(now_s, s * 2.4e-3, WAY_M, 0.0)
     assert course.takes_back(now_s, -s * 3.9e-3, WAY_M, 0.0), "it comes to the stem"
     assert not course.takes_back(now_s, -s * 4.1e-3, WAY_M, 0.0)
-    assert course.takes_back(now_s, s * 9.9e-3, 0.02, 0.0), "as much as single slides leave"
-    assert not course.takes_back(now_s, s * 10.1e-3, 0.02, 0.0), "too slow to carry it"
+    assert course.takes_back(now_s, s * 5.7e-3, 0.02, 0.0), "as much as single slides leave, 20 mm/sqrt(12)"
+    assert not course.takes_back(now_s, s * 5.8e-3, 0.02, 0.0), "too slow to carry it"
     assert course.lead_m(now_s + 0.8, WAY_M) == 0.0, "it has ended"
 
 
@@ -94,8 +94,8 @@ def test_three_changes_make_a_trend_and_one_ends_it() -> None:
 
 
 def test_a_ramp_is_left_until_two_slides_cost_less_than_they_save() -> None:
-    """By hand, 53.3 um/s, m = 3 mm: m/2, or, away for 20 s: (3/2 9 mm^2 20 s 53.3 um/s)^(1/3) = 2.433 mm."""
+    """By hand, 53.3 um/s, m = 3 mm: m/sqrt(12), or, away for 20 s: (3/2 9 mm^2 20 s 53.3 um/s)^(1/3) = 2.433 mm."""
     course, now_s = written(0.06 + 0.02667e-3 * i for i in range(5))
-    for least_m, away_s in ((1.5e-3, 0.0), (1.5e-3, 0.5), (2.433e-3, 20.0)):
+    for least_m, away_s in ((0.866e-3, 0.0), (0.866e-3, 0.5), (2.433e-3, 20.0)):
         assert course.takes_back(now_s, 0.99 * least_m, 3e-3, away_s)
         assert not course.takes_back(now_s, 1.01 * least_m, 3e-3, away_s)

@@ -10,7 +10,7 @@ and the reference has come to rest when it has stood for 1.5 Δ. Until then, of 
     abs(e) <= 3 D                      left alone: the next references may take it back; of references that go to and
                                        fro, e is the least error that the last three have had
     e carried by N = 8 references      left alone: a ramp brings it within the reach of one slide, or back to the stem
-    abs(e) <= m/2 on a ramp            left alone: single slides leave as much
+    abs(e) <= m/sqrt(12) on a ramp     left alone: single slides leave as much, rms
     e^3 <= 3/2 m^2 T v on a ramp       left alone: two slides would cost more than they save
     else                               corrected as if the reference rested
 
@@ -26,12 +26,13 @@ the reference leave errors of 0 to m, rms m/sqrt(3), those that land ahead of it
 
     -m/2 to m/2,   rms m/sqrt(12)      lead = min(m/2, N D)
 
-with the same travel: no stem that can only be moved by m comes nearer. N D is as far as N references go. A ramp
-that has gone as far as m since it turned is taken to go on by m/2, and no excursion is made for it.
+with the same travel: no stem that can only be moved by m comes nearer. N D is as far as N references go. A ramp is
+taken to go on as far as it has gone since it turned: from m/2 on no excursion is made for it.
 """
 
 from dataclasses import dataclass
 from itertools import accumulate
+from math import sqrt
 from operator import sub
 
 from positioner.control.laws.slides.slide_bounds import THRESHOLDS
@@ -102,8 +103,8 @@ class ReferenceCourse:
         return 1 if min(last_m) > 0.0 else -1 if max(last_m) < 0.0 else 0
 
     def goes_far(self, way_m: float) -> bool:
-        """Whether the run is a ramp that has gone farther than a slide of way_m, the shortest."""
-        return self.trend != 0 and self.turned_m is not None and abs(self.value_m - self.turned_m) >= way_m
+        """Whether the run is a ramp that has gone half as far as a slide of way_m, the shortest: it goes on so far."""
+        return self.trend != 0 and self.turned_m is not None and abs(self.value_m - self.turned_m) >= 0.5 * way_m
 
     def lead_m(self, now_s: float, way_m: float) -> float:
         """Return how far ahead of the reference, m, signed, a slide is to land, the shortest of which is way_m."""
@@ -136,5 +137,6 @@ class ReferenceCourse:
             return abs(error_m) <= coming_m
         if self.trend == 0:
             return False
-        costs_more = abs(error_m) <= max(0.5 * way_m, (1.5 * way_m**2 * away_s * self.rate_m_per_s) ** (1 / 3))
+        saves_m = (1.5 * way_m**2 * away_s * self.rate_m_per_s) ** (1 / 3)
+        costs_more = abs(error_m) <= max(way_m / sqrt(12.0), saves_m)
         return costs_more or abs(error_m) + coming_m + abs(self.lead_m(now_s, way_m)) >= way_m
