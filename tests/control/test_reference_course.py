@@ -44,7 +44,7 @@ def test_a_slow_ramp_is_left_to_come_until_an_excursion_saves_more_than_it_costs
 
 def test_a_ramp_that_goes_farther_than_a_slide_is_followed_by_single_slides_ahead_of_it() -> None:
     """They land half a way ahead; no excursion is made, ahead of the reference or behind it."""
-    course, now_s = written([0.06 + 5e-4 * i for i in range(12)])
+    course, now_s = written([0.06 + 5e-4 * i for i in range(7)])
     assert course.goes_far(WAY_M)
     assert course.lead_m(now_s, WAY_M) == pytest.approx(0.5 * WAY_M)
     assert course.takes_back(now_s, 0.99 * WAY_M, WAY_M, 0.5)
@@ -52,7 +52,7 @@ def test_a_ramp_that_goes_farther_than_a_slide_is_followed_by_single_slides_ahea
     assert not course.takes_back(now_s + 0.8, 0.99 * WAY_M, WAY_M, 0.5), "it has ended"
     short, now_s = written([0.06 + 5e-4 * i for i in range(5)])
     assert not short.goes_far(WAY_M)
-    turned = course.after(now_s + 0.5, 0.064)
+    turned = course.after(now_s + 0.5, 0.0625)
     assert not turned.goes_far(WAY_M)
 
 

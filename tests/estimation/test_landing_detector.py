@@ -5,7 +5,7 @@ from collections.abc import Callable
 
 import pytest
 
-from positioner.estimation.landings.landing_detector import LandingDetector, SlideOutcome
+from positioner.estimation.landings.landing_detector import Answers, LandingDetector, SlideOutcome
 from positioner.estimation.landings.seen_time import SeenTime
 
 STROKE_M = 0.1
@@ -142,3 +142,23 @@ def test_a_loop_that_becomes_slower_is_seen_again() -> None:
             shown_s = clock.at(now_s)
     later_s = clock.at(now_s + 0.1)
     assert later_s - shown_s == pytest.approx(0.1)
+
+
+def test_a_stem_sent_out_and_back_is_waited_for_as_long_as_the_longer_way_takes() -> None:
+    """The pressure is somewhere between the two commands: it has no farther to come back than from one of them."""
+    detector, now_s, dt_s = LandingDetector(0.1), 0.0, 0.02
+    detector.answers = Answers(longest_s=0.1, slowness_s_per_pa=3e-5, large_pa=50e3)
+
+    def seen(positions_m: list[float], command_pa: float) -> float:
+        """Return for how long the stem was seen before its rest was known, s."""
+        nonlocal now_s
+        begun_s, waited_s = now_s, math.inf
+        for position_m in positions_m:
+            now_s += dt_s
+            detector.update(now_s, position_m, command_pa, math.nan)
+            waited_s = min(waited_s, now_s - begun_s if detector.rest is not None else math.inf)
+        return waited_s
+
+    seen([0.05] * 100, 50e3)
+    assert seen([0.05 + 5e-4 * i for i in range(10)], 100e3) == math.inf
+    assert 1.9 < seen([0.055] * 300, 50e3) < 2.5, "1.5 times 50 kPa at 27 us/Pa; there and back would be twice that"
