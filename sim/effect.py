@@ -201,11 +201,6 @@ class Effect:
         return "sensor" in self.functions and self.memory > 0 and not self.in_time
 
     @property
-    def moves_at_rest(self) -> bool:
-        """Whether it moves the stuck stem: what is seen to move need not have broken loose."""
-        return "motion" in self.functions
-
-    @property
     def written(self) -> str:
         """How a valve file names it: an own effect by its path."""
         return self.name if self.path.parent == SHIPPED else str(self.path)

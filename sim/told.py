@@ -15,8 +15,8 @@ It was at least L at every sample of a rest, and at most L where the stem broke 
 within `blur` of where it is held, m: of a rest L is the least there, of a break-away the most. A held stem that would
 come to rest again within `UNSEEN` of it gives way, as into a stop: nobody has seen it stay.
 
-Where an effect moves the stuck stem (`creeps`), what is seen to move has not yet broken loose: it does so by itself, at
-F_s by the law of `sim.karnopp`, and no onset tells a load.
+Where an effect has moved the stuck stem by more than the blur, what is seen to move has not yet broken loose: it does
+so by itself, at F_s by the law of `sim.karnopp`, and its onset tells no load. So it does where it rests within a move.
 
 What acts on the stem's measured position, a positioner, is fed that: the loop is cut, and a pressure without feedback
 is smooth in every parameter.
@@ -69,6 +69,10 @@ class Told(NamedTuple):
     now: Condition
     load: float
     fast: float
+    landed: float
+    """Where it came to rest, m: an effect may have moved it since."""
+    creeps: float
+    """1 if an effect has ever moved it at rest by more than the blur."""
 
 
 def told_valve(theta: Vector) -> Karnopp:
@@ -118,7 +122,8 @@ def carried(
     longest_step: float,
     tolerance: float,
     held: bool,
-    creeps: bool,
+    landed: float,
+    creeps: float,
     fast: float,
     seen: float,
     seen_rate: float,
@@ -152,27 +157,40 @@ def carried(
             if rested or abs(x - place) <= blur:
                 most = max(most, load(valve, Stem(t0, x, 0.0, p0), blur, not held, q, z))
             stays = held and not (rested and gives_way(free, Stem(t0 + s, x, 0.0, p), blur, q, z))
-            law = free if held or creeps or fast > 0.0 else valve
+            crept = rested and abs(x - landed) > blur
+            creeps = 1.0 if crept else creeps
+            law = free if held or crept or fast > 0.0 else valve
             drive = Drive(t0, p0, (p - p0) / s)
             x, v, mode, sigma, indicated = follow(law, drive, s, x, v, p, mode, sigma, tolerance, stays, q, z)
             if mode == STUCK:
-                fast = 0.0
+                fast = 0.0 if held else fast * creeps
             elif abs(v) > FAST * valve.v_s:
                 fast = 1.0
+            if not (rested and mode == STUCK) or held != stays:
+                landed = x
             t0 += s
             left -= s
             if mode == STUCK and held and not (rested and p == p0):
                 most = max(most, load(valve, Stem(t0, x, v, p), blur, False, q, z))
     off = unknown(sigma + excess(valve, Stem(t + duration, x, v, p), q, z))
-    return Told(Condition(t + duration, x + off, v, p, mode, sigma, indicated + off), most, fast)
+    return Told(Condition(t + duration, x + off, v, p, mode, sigma, indicated + off), most, fast, landed, creeps)
 
 
-def alike(i: int, commands: Vector, held: Vector) -> int:
-    """Return the period after the last that goes on as the i-th: the stem held throughout, the command the same."""
-    end = i
-    while end < len(commands) and held[end] >= 1.0 and commands[end] == commands[i]:
+def alike(k: int, commands: Vector, held: Vector, indicated: Vector, blur: float) -> int:
+    """Return the period after the last that goes on as the k-th: held throughout, the command the same, and at rest."""
+    end = k + 1
+    if k == 0 or held[k] < 1.0 or abs(indicated[k] - indicated[k - 1]) > SETTLED_SHARE * blur:
+        return end
+    while end < len(commands) and held[end] >= 1.0 and commands[end] == commands[k]:
         end += 1
     return end
+
+
+def unsay(loads: Vector, k: int) -> None:
+    """Take back what was told up to a period to have broken it loose: it crept."""
+    while k >= 0 and loads[k] > 0.0:
+        loads[k] = 0.0
+        k -= 1
 
 
 def tell(
@@ -185,7 +203,6 @@ def tell(
     longest_step: float,
     tolerance: float,
     blur: float,
-    creeps: float,
     indicated: Vector,
     loads: Vector,
 ) -> None:
@@ -195,13 +212,11 @@ def tell(
     Shares, (periods,), from 0, loose throughout, to 1, held throughout. Loads, (2, periods): L, N, of the stem held in
     a period, and where it was let go in it; 0 where it was not.
 
-    Creeps, 1 or 0: whether a stem that is let go yet breaks loose by itself.
-
     A stem that stays held under the same command is carried at once to its end, if what it shows has come to rest: L is
     convex between, and greatest at one of the ends.
     """
     valve, now, fast = told_valve(theta), read(state), 0.0
-    place, yields = FAR_M, creeps > 0.0
+    place, landed, creeps = FAR_M, now.x, 0.0
     indicated[0] = now.indicated
     k, n = 0, len(commands)
     while k < n:
@@ -212,31 +227,62 @@ def tell(
         fed = seen[k]
         end = k + 1
         if rests_s > 0.0:
-            if now.mode == STUCK and k > 0 and not seen[k] == seen[k]:  # noqa: SIM201 -- NaN is unlike itself
-                if abs(indicated[k] - indicated[k - 1]) <= SETTLED_SHARE * blur:
-                    end = max(alike(k, commands, held), end)
+            if now.mode == STUCK and not seen[k] == seen[k]:  # noqa: SIM201 -- NaN is unlike itself
+                end = alike(k, commands, held, indicated, blur)
                 for j in range(k + 1, end):
                     rests_s += periods[j]
             here = carried(
-                *(valve, now, command, rests_s, longest_step, tolerance, True, yields, fast, fed, rate, blur, FAR_M),
+                *(
+                    valve,
+                    now,
+                    command,
+                    rests_s,
+                    longest_step,
+                    tolerance,
+                    True,
+                    landed,
+                    creeps,
+                    fast,
+                    fed,
+                    rate,
+                    blur,
+                    FAR_M,
+                ),
                 *(theta, state),
             )
-            now, fast = here.now, here.fast
+            now, fast, landed, creeps = here.now, here.fast, here.landed, here.creeps
             for j in range(k, end):
                 loads[0, j], loads[1, j], indicated[j + 1] = max(here.load, HELD_N), 0.0, now.indicated
             place = now.x if now.mode == STUCK else FAR_M
         if slides_s > 0.0:
-            still = abs(now.x - place) <= blur
+            still = abs(now.x - place) <= blur and abs(now.x - landed) <= blur
             fed += rate * rests_s
             here = carried(
-                *(valve, now, command, slides_s, longest_step, tolerance, False, yields, fast, fed, rate, blur, place),
+                *(
+                    valve,
+                    now,
+                    command,
+                    slides_s,
+                    longest_step,
+                    tolerance,
+                    False,
+                    landed,
+                    creeps,
+                    fast,
+                    fed,
+                    rate,
+                    blur,
+                    place,
+                ),
                 *(theta, state),
             )
-            now, fast = here.now, here.fast
+            now, fast, landed, creeps = here.now, here.fast, here.landed, here.creeps
             if still:
                 loads[1, k] = max(here.load, loads[0, k], HELD_N)
             if abs(now.x - place) > blur:
                 place = FAR_M
+            if now.mode == STUCK and abs(now.x - landed) > blur:
+                unsay(loads[1], k)
         k = end
         indicated[k] = now.indicated
     write(state, now)

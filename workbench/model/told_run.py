@@ -97,8 +97,6 @@ class ToldRun:
         self._tell = self._composition.told.tell
         self.hidden = any(each.hides_motion for each in self._composition.effects)
         """Whether the stem may move before it is seen to."""
-        self.creeps = any(each.moves_at_rest for each in self._composition.effects)
-        """Whether it may be seen to move before it breaks loose."""
         self._parts = [
             _part(each, [k for k, move in enumerate(told) if move.segment == number], told, record)
             for number, each in enumerate(self.free._segments)
@@ -147,7 +145,7 @@ class ToldRun:
             shown_m, loads = np.empty(segment.periods_s.size + 1), np.empty((2, segment.periods_s.size))
             self._tell(
                 *(vector, state, drive_pa, segment.periods_s, held, seen_m),
-                *(segment.step_s, self.free._tolerance, self.record.scale_m, float(self.creeps), shown_m, loads),
+                *(segment.step_s, self.free._tolerance, self.record.scale_m, shown_m, loads),
             )
             indicated_m[segment.first : segment.end] = shown_m[:: segment.parts]
             if part.rested.size:
@@ -156,7 +154,7 @@ class ToldRun:
                 bears[part.first : part.end], breaks[part.first : part.end] = np.maximum.reduceat(
                     loads, part.rested, axis=1
                 )
-        return ToldPath(indicated_m, bears, np.zeros(breaks.size) if self.creeps else breaks)
+        return ToldPath(indicated_m, bears, breaks)
 
     def _held(self, part: "_Part", onsets_s: Vector) -> Vector:
         """Return the share of each period for which the stem is held."""
