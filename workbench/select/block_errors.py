@@ -29,6 +29,7 @@ from workbench.fit.fitting import COARSE_ROUNDS, at_the_noise, problem_of
 from workbench.fit.likelihood import Groups, Likelihood, Rows, motion_rows
 from workbench.fit.minimiser import descend
 from workbench.fit.onsets import with_onsets
+from workbench.fit.uncertainty import FARTHEST
 from workbench.model.sampling import NO_LANDING
 from workbench.select.residual_structure import structure
 
@@ -54,7 +55,7 @@ MOST_MOVED = 4.0
 LEFT_OPEN = 0.2
 """Deviation of a coordinate, of a logarithm mostly, from which on a step along the slope may not lead far enough."""
 MOST_TRIED = 10
-"""Places so far apart, or of two deviations, that are tried of it on either side."""
+"""Places that are tried of it on either side, from so far on to two deviations."""
 SAME_STANDARD_ERRORS, SAME_REDUCTION = 2.0, 0.02
 """Within one of these two models are indistinguishable."""
 BLOCK_S, BLOCK_SAMPLES = 1.0, 10
@@ -174,8 +175,7 @@ def _open(fit: Fit, like: Likelihood, z: Column) -> list[Column]:
     found = []
     for i, each in enumerate(like.parameters):
         if deviation[i] > LEFT_OPEN and each.index != STATIC:
-            reach = MOST_TRIED * min(LEFT_OPEN, deviation[i] / (0.5 * MOST_TRIED))
-            ahead = np.linspace(0.0, reach, MOST_TRIED + 1)[1:]
+            ahead = np.geomspace(LEFT_OPEN, min(2.0 * deviation[i], FARTHEST), MOST_TRIED)
             for by in (*-ahead[::-1], *ahead):
                 there = z.copy()
                 there[i] = np.clip(z[i] + by, *each.bounds)
