@@ -193,7 +193,7 @@ def meaning_table(told: Sequence[Change]) -> Table:
 
 
 def trend(told: Sequence[Record], names: Sequence[str]) -> Table:
-    """Return the newest records, a row each: when, as what, the verdict, and figures by their names."""
+    """Return the newest records, a row each: when, the verdict, as what, and figures by their names."""
     shown = told[-TREND:]
     texts = {each.name: each.text for record in shown for each in record.outcome.quantities}
     rows = []
