@@ -3,7 +3,8 @@
     held    v = 0 whatever the forces                                 until the onset of a move
     loose   m v' = F_e - F_v v - F_c sigma, from rest if |F_e| > F_c  to the last sample that the record shows in motion
             once it has been faster than `FAST` v_s by the law of `sim.karnopp`, with Stribeck's term, until it sticks
-    after it the stem slides by that law until it stops, and is held again: with F_c alone a ramp carried it on
+    after it the stem slides until it stops, and is held again; where the command goes on, by that law: with F_c alone a
+            ramp carried it on
 
 x stem position, m; v velocity, m/s; F_e external force, F_c sliding friction, N, with all effects as in `sim.karnopp`.
 Static friction has no part in when it moves. What it would have to be is told beside it: with F_s' = g F_s + d what the
@@ -159,7 +160,7 @@ def carried(
             stays = held and not (rested and gives_way(free, Stem(t0 + s, x, 0.0, p), blur, q, z))
             crept = rested and abs(x - landed) > blur
             creeps = 1.0 if crept else creeps
-            law = free if held or crept or fast > 0.0 else valve
+            law = free if crept or fast > 0.0 or held != stays else valve
             drive = Drive(t0, p0, (p - p0) / s)
             x, v, mode, sigma, indicated = follow(law, drive, s, x, v, p, mode, sigma, tolerance, stays, q, z)
             if mode == STUCK:
@@ -184,6 +185,11 @@ def alike(k: int, commands: Vector, held: Vector, indicated: Vector, blur: float
     while end < len(commands) and held[end] >= 1.0 and commands[end] == commands[k]:
         end += 1
     return end
+
+
+def goes_on(k: int, commands: Vector, now: Condition) -> float:
+    """Return 1 of a stem that still slides while its command changes, else 0."""
+    return 1.0 if k > 0 and now.mode != STUCK and commands[k] != commands[k - 1] else 0.0
 
 
 def unsay(loads: Vector, k: int) -> None:
@@ -231,24 +237,10 @@ def tell(
                 end = alike(k, commands, held, indicated, blur)
                 for j in range(k + 1, end):
                     rests_s += periods[j]
+            fast = max(fast, goes_on(k, commands, now))
             here = carried(
-                *(
-                    valve,
-                    now,
-                    command,
-                    rests_s,
-                    longest_step,
-                    tolerance,
-                    True,
-                    landed,
-                    creeps,
-                    fast,
-                    fed,
-                    rate,
-                    blur,
-                    FAR_M,
-                ),
-                *(theta, state),
+                *(valve, now, command, rests_s, longest_step, tolerance, True, landed, creeps),
+                *(fast, fed, rate, blur, FAR_M, theta, state),
             )
             now, fast, landed, creeps = here.now, here.fast, here.landed, here.creeps
             for j in range(k, end):
@@ -258,23 +250,8 @@ def tell(
             still = abs(now.x - place) <= blur and abs(now.x - landed) <= blur
             fed += rate * rests_s
             here = carried(
-                *(
-                    valve,
-                    now,
-                    command,
-                    slides_s,
-                    longest_step,
-                    tolerance,
-                    False,
-                    landed,
-                    creeps,
-                    fast,
-                    fed,
-                    rate,
-                    blur,
-                    place,
-                ),
-                *(theta, state),
+                *(valve, now, command, slides_s, longest_step, tolerance, False, landed, creeps),
+                *(fast, fed, rate, blur, place, theta, state),
             )
             now, fast, landed, creeps = here.now, here.fast, here.landed, here.creeps
             if still:
