@@ -104,7 +104,6 @@ class ToldRun:
         time_s = record.time_s
         self._first_onsets_s = np.array([0.5 * (time_s[each.before] + time_s[each.before + 1]) for each in told])
         self._first_onsets_s.setflags(write=False)
-        self._pushed_s = _pushed_s(record, told)
         self._fed = {each.segment.first: self._fed_m(each.segment) for each in self._parts}
 
     def _fed_m(self, segment: Segment) -> Vector:
@@ -123,14 +122,12 @@ class ToldRun:
     def bounds_s(self, periods: float) -> tuple[Vector, Vector]:
         """Return between which times the onsets lie: so many periods about where they show, within their rests.
 
-        A stem whose sensor may stay while it moves has left at any time of the rest. None leaves before a command that
-        stood still has changed.
+        A stem whose sensor may stay while it moves has left at any time of the rest.
         """
         first, period_s, time_s = self.first_onsets_s(), self.period_s, self.record.time_s
         earliest = np.array([time_s[each.rested_from] for each in self.moves])
         latest = np.array([time_s[max(each.after - 1, each.before)] for each in self.moves])
         low = earliest if self.hidden else np.maximum(first - periods * period_s, earliest)
-        pass
         return np.minimum(low, first - 0.5 * period_s), np.maximum(
             np.minimum(first + periods * period_s, latest), first + 0.5 * period_s
         )
@@ -171,17 +168,6 @@ class ToldRun:
         begin_s, end_s = part.starts_s[at], part.starts_s[at + 1]
         held[at] = np.clip((onset_s - begin_s) / (end_s - begin_s), 0.0, 1.0)
         return held
-
-
-def _pushed_s(record: Record, told: tuple[ToldMove, ...]) -> Vector:
-    """Return when the command changed for the first time in the rest before each move, if amid its last period, s."""
-    pushed = np.full(len(told), -np.inf)
-    for k, move in enumerate(told):
-        stood = record.command_pa[move.rested_from : move.before + 1]
-        changed = np.flatnonzero(stood != stood[0])
-        if changed.size:
-            pushed[k] = record.time_s[move.rested_from + changed[0]]
-    return pushed
 
 
 @dataclass(frozen=True, slots=True)
