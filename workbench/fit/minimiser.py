@@ -18,11 +18,10 @@ alone, so that a start far off finds its valley there.
 """
 
 from collections.abc import Callable
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 from typing import NamedTuple
 
 import numpy as np
-import numpy.typing as npt
 
 from sim.composition import COULOMB, SPRING, STATIC, VISCOUS
 from sim.karnopp import Vector
@@ -116,8 +115,6 @@ class Ground:
     low: Place
     high: Place
     soft: float
-    hinged: npt.NDArray[np.bool_]
-    """Coordinates that hardly act but beyond an edge, (parameters,): static friction, by break-aways."""
 
     def cost(self, r: Vector) -> float:
         """Return the soft-L1 cost of residuals."""
@@ -155,7 +152,7 @@ def minimise(ground: Ground, begin: Place, effort: Effort) -> Place:
         return rows(place)
 
     here = Place(*(np.clip(at, low, high) for at, low, high in zip(begin, ground.low, ground.high, strict=True)))
-    ground = replace(ground, rows=simulated)
+    ground = Ground(simulated, ground.of, ground.low, ground.high, ground.soft)
     r = ground.rows(here)
     cost, slopes, fresh, damping, idle = ground.cost(r), ground.slopes(here, r), True, DAMPING.first, False
     while left > 0 and damping <= DAMPING.most:
@@ -170,9 +167,9 @@ def minimise(ground: Ground, begin: Place, effort: Effort) -> Place:
         there = Place(here.z + step.z, here.o + step.o)
         r_there = ground.rows(there)
         gained = cost - ground.cost(r_there)
-        if gained <= DAMPING.poor * promised:
-            there, r_there = _what_helps(ground, here, there, r_there)
-            step = Place(there.z - here.z, there.o - here.o)
+        if gained <= DAMPING.poor * promised and here.o.size:
+            there, r_there = _with_onsets_that_help(ground, there, r_there, here.o)
+            step = Place(step.z, there.o - here.o)
             linear = r + slopes.by_z @ step.z + slopes.by_onset * ground.to_rows(step.o)
             gained = cost - ground.cost(r_there)
         kept, small = gained > DAMPING.poor * promised, gained < enough * cost
@@ -193,26 +190,16 @@ def minimise(ground: Ground, begin: Place, effort: Effort) -> Place:
     return here
 
 
-def _what_helps(ground: Ground, here: Place, there: Place, r: Vector) -> tuple[Place, Vector]:
-    """Return where a step that kept little of its promise leads with less of it, and the residuals there.
+def _with_onsets_that_help(ground: Ground, there: Place, r: Vector, before: Vector) -> tuple[Place, Vector]:
+    """Return a place with those of its onsets left as before whose moves do better so, if all together do; residuals.
 
-    What has a slope on one side of an edge alone may have been promised the other side's: a hinged coordinate, and the
-    onset of a stem that a step of the command lets go. They are left as before where that is better; an onset by what
-    its own move says.
+    Where a command steps an onset has no slope on one side: what it was promised may be the other's.
     """
-    if ground.hinged.any():
-        unhinged = Place(np.where(ground.hinged, here.z, there.z), there.o)
-        left = ground.rows(unhinged)
-        if ground.cost(left) < ground.cost(r):
-            there, r = unhinged, left
-    if here.o.size:
-        left = ground.rows(Place(there.z, here.o))
-        worse = ground.of_moves(soft(left, ground.soft)) < ground.of_moves(soft(r, ground.soft))
-        mixed = Place(there.z, np.where(worse, here.o, there.o))
-        r_mixed = ground.rows(mixed)
-        if ground.cost(r_mixed) < ground.cost(r):
-            there, r = mixed, r_mixed
-    return there, r
+    left = ground.rows(Place(there.z, before))
+    worse = ground.of_moves(soft(left, ground.soft)) < ground.of_moves(soft(r, ground.soft))
+    mixed = Place(there.z, np.where(worse, before, there.o))
+    r_mixed = ground.rows(mixed)
+    return (mixed, r_mixed) if ground.cost(r_mixed) < ground.cost(r) else (there, r)
 
 
 def _step(ground: Ground, here: Place, r: Vector, slopes: Slopes, damping: float) -> tuple[Place, Place]:
@@ -277,7 +264,7 @@ def begin_by_landings(like: Likelihood, z: Vector) -> Vector:
         return np.concatenate([landed, found.break_aways, (at.z - start) / prior])
 
     of = np.zeros(like.layout.per_rest.size + like.broken.size + start.size, dtype=np.int64)
-    ground = Ground(rows, of, Place(low, none), Place(high, none), like.weights.soft, _hinged(like))
+    ground = Ground(rows, of, Place(low, none), Place(high, none), like.weights.soft)
     return minimise(ground, Place(start, none), TO_BEGIN).z
 
 
@@ -323,17 +310,8 @@ def _ground(like: Likelihood, held: tuple[Vector, Vector] | None = None) -> Grou
 
     of = like.move_of if held is None else np.append(like.move_of, np.full(low.size, len(like.moves)))
     return Ground(
-        rows,
-        of,
-        Place(low, _periods(like, earliest_s)),
-        Place(high, _periods(like, latest_s)),
-        like.weights.soft,
-        _hinged(like),
+        rows, of, Place(low, _periods(like, earliest_s)), Place(high, _periods(like, latest_s)), like.weights.soft
     )
-
-
-def _hinged(like: Likelihood) -> npt.NDArray[np.bool_]:
-    return np.array([each.index == STATIC for each in like.parameters], dtype=np.bool_)
 
 
 def _periods(like: Likelihood, onsets_s: Vector) -> Vector:
