@@ -26,7 +26,7 @@ from pathlib import Path
 
 import numpy as np
 
-from benchmarks.few_slips import EFFECTS, drawn
+from benchmarks.few_slips import drawn, effects_of
 from benchmarks.kept_lines import Line, kept, run
 from config.recording import Recording
 from config.valve_file import ValveFile, find_valve, load_valve
@@ -111,7 +111,7 @@ def _other(family: str, seed: int) -> Problem:
 
 
 def _few_slips(seed: int) -> Problem:
-    effects = ((), *((name,) for name in EFFECTS))[seed % (1 + len(EFFECTS))]
+    effects = effects_of(seed)
     made, base = drawn(seed, effects), load_valve(find_valve("seed"))
     truth = {**made.valve, **made.hidden}
     return Problem(

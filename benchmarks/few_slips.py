@@ -238,9 +238,14 @@ def drawn(seed: int, effects: tuple[str, ...], *, dirty: bool = False, duration_
     return Drawn(records[0], records[1], effects, valve, hidden, noise)
 
 
+def effects_of(seed: int) -> tuple[str, ...]:
+    """Return what is hidden in the record of a seed: nothing, or one effect, in turn."""
+    return ((), *((name,) for name in EFFECTS))[seed % (1 + len(EFFECTS))]
+
+
 def said(seed: int) -> tuple[str, bool, bool]:
     """Return a line on the record of a seed, and whether what is hidden is found alone, or in a set."""
-    effects = ((), *((name,) for name in EFFECTS))[seed % (1 + len(EFFECTS))]
+    effects = effects_of(seed)
     hidden = drawn(seed, effects)
     library = {each.written: each for each in find_effects(tried_effects(), "effects")}
     begun = time.process_time()
@@ -257,7 +262,7 @@ def said(seed: int) -> tuple[str, bool, bool]:
 
 def fit_true_effect(seed: int) -> tuple[str, bool]:
     """Return a line on the fit of a record of a seed with its true effect, and whether it is at the noise."""
-    effects = ((), *((name,) for name in EFFECTS))[seed % (1 + len(EFFECTS))]
+    effects = effects_of(seed)
     hidden, sheet = drawn(seed, effects), load_valve(find_valve("seed"))
     begun = time.process_time()
     try:
