@@ -101,7 +101,13 @@ class DrawnInside(ScriptedStem):
 
     @property
     def balance(self) -> Balance:
-        return Balance(self.ratios, tuple(self.landings[:20]), tuple(self.held[:20]), STROKE_M, now_s=self.now_s)
+        return Balance(
+            ratios=self.ratios,
+            landings=tuple(self.landings[:20]),
+            held=tuple(self.held[:20]),
+            stroke_m=STROKE_M,
+            now_s=self.now_s,
+        )
 
 
 def drawn_known(rng: np.random.Generator) -> KnownValve:

@@ -23,7 +23,7 @@ from config.codes import PROVISIONAL, Restored
 from config.extended_valve import ExtendedValve
 from positioner.control.valve_knowledge import ValveKnowledge
 from positioner.estimation.landings.landing_detector import STOP, VISIBLE, SlideOutcome
-from positioner.estimation.landings.local_balance import known_law, landing_pa
+from positioner.estimation.landings.local_balance import LocalBalance
 
 DEVIATIONS, AGREEING_STROKE_SHARE = 3.0, 3e-3
 """Of the stroke: landings nearer than this agree."""
@@ -123,9 +123,15 @@ def _landing_m(
     outcome: SlideOutcome, direction: int, knowledge: ValveKnowledge, valve: ExtendedValve | None, stroke_m: float
 ) -> float:
     """Return where a slide lands: by the law, corrected by what landings near there missed it by."""
-    law = known_law(knowledge.ratios, stroke_m, valve, outcome.time_s)
+    balance = LocalBalance(
+        ratios=knowledge.ratios,
+        landings=tuple(knowledge.landings),
+        stroke_m=stroke_m,
+        valve=valve,
+        now_s=outcome.time_s,
+    )
     lands_m = (knowledge.landing_m if valve is None else valve.lands_m)(outcome.command_pa, direction)
-    off_pa = landing_pa(lands_m, direction, law, knowledge.landings) - outcome.command_pa
+    off_pa = balance.pressure_pa(lands_m, direction) - outcome.command_pa
     return lands_m - off_pa / -knowledge.ratios.b_over_c
 
 

@@ -66,7 +66,13 @@ class ScriptedStem:
     def balance(self) -> Balance:
         up_pa, down_pa = ((1.0 + self.known_off) * each for each in (self.up_pa, self.down_pa))
         ratios = Ratios(-SLOPE_PA_PER_M, -0.5 * (up_pa + down_pa), 0.5 * (up_pa - down_pa))
-        return Balance(ratios, tuple(self.landings[:20]), tuple(self.held[:20]), STROKE_M, now_s=self.now_s)
+        return Balance(
+            ratios=ratios,
+            landings=tuple(self.landings[:20]),
+            held=tuple(self.held[:20]),
+            stroke_m=STROKE_M,
+            now_s=self.now_s,
+        )
 
     def scattered_m(self) -> float:
         """Return how far a slide lands off its balance, m."""

@@ -16,7 +16,7 @@ FRICTION_PA = 20e3
 KNOWN, LONG, SHORT = (Interval(0.99 * each, each, seen=True) for each in (5.6e-3, 10e-3, 5e-3))
 PLAN = Plan(
     bounds=SETTINGS,
-    balance=Balance(Ratios(-SLOPE_PA_PER_M, -FRICTION_PA), (), (), STROKE_M),
+    balance=Balance(ratios=Ratios(-SLOPE_PA_PER_M, -FRICTION_PA), landings=(), held=(), stroke_m=STROKE_M),
     distances=BreakawayDistance(KNOWN, KNOWN, KNOWN, KNOWN),
     local=MIDDLE,
     anchor=Anchor(0.0595, 1),

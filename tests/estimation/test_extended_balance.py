@@ -12,7 +12,7 @@ from positioner.estimation.landings.extended_balance import (
     straight_law,
 )
 from positioner.estimation.landings.landing_detector import SlideOutcome
-from positioner.estimation.landings.local_balance import known_law, landing_pa
+from positioner.estimation.landings.local_balance import LocalBalance
 from positioner.estimation.landings.static_law import static_law
 
 L, SLOPE, BEND, F_C, OFFSET = 0.1, 8e5, 3e6, 2e4, 5e3
@@ -45,7 +45,8 @@ def landing(x: float, s: int, beyond_pa: float) -> SlideOutcome:
 
 
 def lands_pa(x: float, s: int, valve: ExtendedValve, landings: list[SlideOutcome], now_s: float) -> float:
-    return landing_pa(x, s, known_law(straight_law(valve), L, valve, now_s), landings)
+    balance = LocalBalance(ratios=straight_law(valve), landings=tuple(landings), stroke_m=L, valve=valve, now_s=now_s)
+    return balance.pressure_pa(x, s)
 
 
 @pytest.mark.parametrize("s", [1, -1])

@@ -1,5 +1,7 @@
 """The static law from landings: exact, under noise, and when it is refused."""
 
+from collections.abc import Iterable
+
 import numpy as np
 import pytest
 
@@ -7,7 +9,7 @@ from config.codes import Refusal
 from positioner.estimation.acceptance import Applied, Ratios
 from positioner.estimation.estimates import Estimate, Estimates
 from positioner.estimation.landings.landing_detector import SlideOutcome
-from positioner.estimation.landings.local_balance import KnownLaw, landing_pa, scatter_m
+from positioner.estimation.landings.local_balance import LocalBalance
 from positioner.estimation.landings.static_identification import StaticIdentification
 from positioner.estimation.landings.static_law import StaticLaw, static_law
 
@@ -127,14 +129,18 @@ def test_the_seeds_model_stands_where_landings_agree() -> None:
     assert statics.corrected(applied) is applied
 
 
+def balance(ratios: Ratios, landings: Iterable[SlideOutcome]) -> LocalBalance:
+    return LocalBalance(ratios=ratios, landings=tuple(landings), stroke_m=STROKE_M)
+
+
 def test_a_local_landing_corrects_the_straight_law() -> None:
     law: StaticLaw = static_law(landings(bow=2e3), STROKE_M)
     place_m = 0.5 * STROKE_M
     true_pa = SLOPE * place_m + UP + 2e3
     near = landing(place_m, 1, true_pa)
-    assert abs(landing_pa(place_m, 1, KnownLaw(law.ratios, STROKE_M), ()) - true_pa) > 100
-    assert abs(landing_pa(place_m, 1, KnownLaw(law.ratios, STROKE_M), (near,)) - true_pa) < 30
-    other_pa = landing_pa(place_m, -1, KnownLaw(law.ratios, STROKE_M), (near,))
+    assert abs(balance(law.ratios, ()).pressure_pa(place_m, 1) - true_pa) > 100
+    assert abs(balance(law.ratios, (near,)).pressure_pa(place_m, 1) - true_pa) < 30
+    other_pa = balance(law.ratios, (near,)).pressure_pa(place_m, -1)
     assert other_pa == pytest.approx(law.ratios.balance_pa(place_m, -1), rel=1e-9)
 
 
@@ -149,9 +155,9 @@ def test_landings_bend_the_law_as_the_valve_is_bent() -> None:
     landed = [landing(each * STROKE_M, s, bent_pa(each, s)) for s in (1, -1) for each in shares]
     law = static_law(landed, STROKE_M)
     for share, s in ((0.5, 1), (0.5, -1), (0.3, 1), (0.75, -1)):
-        off_pa = landing_pa(share * STROKE_M, s, KnownLaw(law.ratios, STROKE_M), law.slides) - bent_pa(share, s)
+        off_pa = balance(law.ratios, law.slides).pressure_pa(share * STROKE_M, s) - bent_pa(share, s)
         assert abs(off_pa) < 1e-3 * SLOPE * STROKE_M
-    assert scatter_m(KnownLaw(law.ratios, STROKE_M), law.slides) < 1e-3 * STROKE_M < law.residual_m
+    assert balance(law.ratios, law.slides).scatter_m < 1e-3 * STROKE_M < law.residual_m
 
 
 def test_one_landing_that_lies_apart_does_not_bend_the_law() -> None:
@@ -160,7 +166,7 @@ def test_one_landing_that_lies_apart_does_not_bend_the_law() -> None:
     apart = [landed[3]._replace(command_pa=landed[3].command_pa + 0.02 * SLOPE * STROKE_M), *landed[:3], *landed[4:]]
     law = static_law(landed, STROKE_M)
     for share, s in ((0.3, 1), (0.75, -1)):
-        off_pa = landing_pa(share * STROKE_M, s, KnownLaw(law.ratios, STROKE_M), apart) - bent_pa(share, s)
+        off_pa = balance(law.ratios, apart).pressure_pa(share * STROKE_M, s) - bent_pa(share, s)
         assert abs(off_pa) < 2e-3 * SLOPE * STROKE_M
 
 
@@ -187,9 +193,9 @@ def test_what_the_last_slides_missed_alike_everywhere_is_corrected_everywhere() 
         SlideOutcome(float(i), s, 0.0, SLOPE * x + s * UP + off, x, 1e-6, True, True)
         for i, (x, s, off) in enumerate([*before, *lately])
     ]
-    found = landing_pa(0.045, 1, KnownLaw(ratios, STROKE_M), landings[::-1]) - (SLOPE * 0.045 + UP)
+    found = balance(ratios, landings[::-1]).pressure_pa(0.045, 1) - (SLOPE * 0.045 + UP)
     assert 60.0 < found < 330.0  # without: 13 Pa
-    assert abs(landing_pa(0.045, -1, KnownLaw(ratios, STROKE_M), landings[::-1]) - (SLOPE * 0.045 - UP)) < 60.0
+    assert abs(balance(ratios, landings[::-1]).pressure_pa(0.045, -1) - (SLOPE * 0.045 - UP)) < 60.0
 
 
 @pytest.mark.parametrize("rho", [0.0, 0.02, 0.3])
@@ -227,13 +233,13 @@ def test_a_short_slide_lands_where_long_ones_stick_short_of_their_balance(direct
 
     places_m = np.linspace(0.3, 0.7, 6) * STROKE_M
     landings = [landed(float(at_m), 0.1 * STROKE_M, s, 0.0) for at_m in places_m for s in (1, -1)]
-    law, missed_m = KnownLaw(static_law(landings, STROKE_M).ratios, STROKE_M), []
+    ratios, missed_m = static_law(landings, STROKE_M).ratios, []
     for at_m in np.linspace(0.35, 0.65, 7) * STROKE_M:
-        asked_pa = landing_pa(float(at_m), direction, law, landings, margin_m)
+        asked_pa = balance(ratios, landings).pressure_pa(float(at_m), direction, margin_m)
         sent_m = direction * (asked_pa - SLOPE * at_m - (UP if direction > 0 else -DOWN)) / SLOPE
         landings.insert(0, landed(float(at_m), margin_m, direction, sent_m))
         missed_m.append(abs(sent_m))
     assert missed_m[0] > 0.9 * short_m
     assert missed_m[-1] < 0.1 * short_m
-    long_pa = landing_pa(0.5 * STROKE_M, direction, law, landings, 0.1 * STROKE_M)
-    assert abs(long_pa - law.landing_pa(0.5 * STROKE_M, direction)) < 0.1 * SLOPE * short_m, "long ones go as before"
+    long_pa = balance(ratios, landings).pressure_pa(0.5 * STROKE_M, direction, 0.1 * STROKE_M)
+    assert abs(long_pa - ratios.balance_pa(0.5 * STROKE_M, direction)) < 0.1 * SLOPE * short_m, "long ones go as before"

@@ -24,7 +24,7 @@ its landings. So a law cannot make itself worse than the valve differs from plac
 
 from collections.abc import Iterable, Sequence
 from dataclasses import dataclass
-from functools import lru_cache
+from functools import cached_property
 from math import exp, isnan, nan, sqrt
 from typing import NamedTuple
 
@@ -55,73 +55,63 @@ LARGEST_DRIFT = 0.1
 """Share of friction that a known drift is followed since a landing: a straight line goes on for no longer."""
 
 
-@dataclass(frozen=True, slots=True)
-class KnownLaw:
-    """B_0: the straight law, or an extended valve's in its place, at a time, s."""
+@dataclass(frozen=True, kw_only=True)
+class LocalBalance:
+    """B of what is known; what the landings say is worked out when it is first asked for, and once.
+
+    Attributes:
+        ratios: of the straight law.
+        landings: the latest first; of an extended valve, positions of the stem.
+        stroke_m: full travel, m.
+        valve: extended, in place of the straight law.
+        now_s: to which friction of a valve that drifts is followed, s.
+    """
 
     ratios: Ratios
+    landings: tuple[SlideOutcome, ...]
     stroke_m: float
     valve: ExtendedValve | None = None
     now_s: float = 0.0
 
-    def landing_pa(self, position_m: float, direction: int) -> float:
+    def known_pa(self, position_m: float, direction: int) -> float:
         """Return B_0(x, s), Pa."""
         law = self.ratios.balance_pa if self.valve is None else self.valve.landing_pa
         return law(position_m, direction)
 
-    def off_pa(self, each: SlideOutcome) -> float:
+    def pressure_pa(self, position_m: float, direction: int, way_m: float = nan) -> float:
+        """Return B(x, s), Pa, of a slide that goes so far, m; NaN: as far as the landings did."""
+        bend = self._bend
+        bent_pa = bend.bent_by_pa(position_m / self.stroke_m, direction, way_m)
+        off_pa = bent_pa + bend.near_pa(position_m, direction, WIDTH * self.stroke_m)
+        return self.known_pa(position_m, direction) + bend.seen_pa(off_pa)
+
+    def bent_by_pa(self, position_m: float, direction: int) -> float:
+        """Return by how much the landings are bent away from B_0 at a position, Pa."""
+        return self._bend.bent_by_pa(position_m / self.stroke_m, direction)
+
+    def ahead_m(self, each: SlideOutcome) -> float:
+        """Return how far a change of the command sends a stem that breaks loose, m, by B where it starts from."""
+        ahead_pa = each.command_pa - self.pressure_pa(each.from_m, each.direction)
+        return each.direction * ahead_pa / -self.ratios.b_over_c
+
+    @property
+    def scatter_m(self) -> float:
+        """How far slides scatter from one to the next, a standard deviation, m."""
+        return self._bend.scatter_pa / -self.ratios.b_over_c
+
+    def _off_pa(self, each: SlideOutcome) -> float:
         """Return e_j, Pa."""
-        off_pa = each.command_pa - self.landing_pa(each.position_m, each.direction)
+        off_pa = each.command_pa - self.known_pa(each.position_m, each.direction)
         if self.valve is None or not self.valve.inverse.drift_per_s:
             return off_pa
         share = self.valve.inverse.drift_per_s * (self.now_s - each.time_s)
         up_pa, down_pa = (self.valve.landing_pa(each.position_m, s) for s in (1, -1))
         return off_pa + each.direction * min(max(share, -LARGEST_DRIFT), LARGEST_DRIFT) * 0.5 * (up_pa - down_pa)
 
-
-def known_law(ratios: Ratios, stroke_m: float, valve: ExtendedValve | None = None, now_s: float = 0.0) -> KnownLaw:
-    """Return B_0; of one that does not drift the time is left out, so that it is the same from step to step."""
-    drifts = valve is not None and valve.inverse.drift_per_s != 0.0
-    return KnownLaw(ratios, stroke_m, valve, now_s if drifts else 0.0)
-
-
-def ahead_m(each: SlideOutcome, law: KnownLaw, landings: Sequence[SlideOutcome]) -> float:
-    """Return how far a change of the command sends a stem that breaks loose, m, by the balance where it starts from.
-
-    Args:
-        each: the change, and where the stem was.
-        law, landings: as of `landing_pa`.
-    """
-    ahead_pa = each.command_pa - landing_pa(each.from_m, each.direction, law, landings)
-    return each.direction * ahead_pa / -law.ratios.b_over_c
-
-
-def landing_pa(
-    position_m: float, direction: int, law: KnownLaw, landings: Sequence[SlideOutcome], way_m: float = nan
-) -> float:
-    """Return the pressure, Pa, under which a slide up (+1) or down (-1) lands at a position, m.
-
-    Args:
-        position_m: where it is to land.
-        direction: of the slide.
-        law: known beforehand.
-        landings: the latest first; of an extended valve, positions of the stem.
-        way_m: how far it goes; NaN: as far as the landings did.
-    """
-    bend = _bend(law, tuple(landings))
-    bent_pa = bend.bent_by_pa(position_m / law.stroke_m, direction, way_m)
-    off_pa = bent_pa + bend.near_pa(position_m, direction, WIDTH * law.stroke_m)
-    return law.landing_pa(position_m, direction) + bend.seen_pa(off_pa)
-
-
-def bent_by_pa(position_m: float, direction: int, law: KnownLaw, landings: Sequence[SlideOutcome]) -> float:
-    """Return by how much the landings are bent away from the law at a position, Pa; arguments as of `landing_pa`."""
-    return _bend(law, tuple(landings)).bent_by_pa(position_m / law.stroke_m, direction)
-
-
-def scatter_m(law: KnownLaw, landings: Sequence[SlideOutcome]) -> float:
-    """Return how far slides scatter from one to the next, a standard deviation, m; arguments as of `landing_pa`."""
-    return _bend(law, tuple(landings)).scatter_pa / -law.ratios.b_over_c
+    @cached_property
+    def _bend(self) -> "_Bend":
+        stroke_pa = -self.ratios.b_over_c * self.stroke_m
+        return _bend(self.landings, [self._off_pa(each) for each in self.landings], self.stroke_m, stroke_pa)
 
 
 class _Bend(NamedTuple):
@@ -167,15 +157,13 @@ class _Bend(NamedTuple):
 _STRAIGHT = (0.0,) * len(BENDS)
 
 
-@lru_cache(maxsize=4)
-def _bend(law: KnownLaw, landings: tuple[SlideOutcome, ...]) -> _Bend:
-    """Return what landings say."""
-    stroke_pa = -law.ratios.b_over_c * law.stroke_m
+def _bend(landings: Sequence[SlideOutcome], off_pa: Sequence[float], stroke_m: float, stroke_pa: float) -> _Bend:
+    """Return what landings say that lie off by e_j, Pa; of the stroke, m, and the pressure over it, Pa."""
     if not landings:
         return _Bend(_STRAIGHT, 0.0, 0.0, FINEST * stroke_pa, ((), ()), (0.0, 0.0), 0.0, 0.0)
-    e = np.array([law.off_pa(each) for each in landings])
+    e = np.array(off_pa)
     s = np.array([float(each.direction) for each in landings])
-    t = np.array([2.0 * each.position_m / law.stroke_m - 1.0 for each in landings])
+    t = np.array([2.0 * each.position_m / stroke_m - 1.0 for each in landings])
     went_m = np.array([max(SAME, abs(each.position_m - each.from_m)) for each in landings])
     v = (went_m.min() / went_m) ** 2
     mean_v = float(v.mean())

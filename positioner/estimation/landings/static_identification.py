@@ -16,10 +16,10 @@ from config.codes import Refusal
 from config.extended_valve import ExtendedValve
 from positioner.estimation.acceptance import Applied, Ratios
 from positioner.estimation.estimates import Estimates
-from positioner.estimation.landings import local_balance
 from positioner.estimation.landings.extended_balance import contradicted
 from positioner.estimation.landings.landing_detector import Answers, LandingDetector, SlideOutcome, Supposed
 from positioner.estimation.landings.landing_shift import shifted
+from positioner.estimation.landings.local_balance import LocalBalance
 from positioner.estimation.landings.packing_compliance import compliance
 from positioner.estimation.landings.pressure_delivered import PressureDelivered
 from positioner.estimation.landings.static_law import StaticLaw, no_static_law, static_law
@@ -132,14 +132,10 @@ class StaticIdentification:
         position_m = supposed.rest.position_m
         if self._valve is not None:
             position_m = self._valve.stem_m(position_m, s or self.way)
-        down_pa, up_pa = (local_balance.landing_pa(position_m, way, self._straight, self.balances) for way in (-1, 1))
+        down_pa, up_pa = (self._balance.pressure_pa(position_m, way) for way in (-1, 1))
         low_pa, high_pa = (up_pa if s > 0 else down_pa), (down_pa if s < 0 else up_pa)
         near_pa = AS_COMMANDED * -law.ratios.b_over_c * self._stroke_m
         return low_pa - near_pa <= supposed.command_pa <= high_pa + near_pa
-
-    @property
-    def _straight(self) -> local_balance.KnownLaw:
-        return local_balance.KnownLaw(self.law.ratios, self._stroke_m)
 
     def _of_stem(self, outcome: SlideOutcome, valve: ExtendedValve) -> SlideOutcome:
         """Return an outcome with the positions of the stem in place of those indicated."""
@@ -159,6 +155,7 @@ class StaticIdentification:
             self.valve = None if contradicted(self._valve, self.law) else self._valve
         self.landings = self.law.slides if self.law.valid else landings
         self.balances = tuple(balanced(each, self.law.swing) for each in self.landings)
+        self._balance = LocalBalance(ratios=self.law.ratios, landings=self.balances, stroke_m=self._stroke_m)
 
     def _gave_way(self, outcome: SlideOutcome) -> bool:
         """Whether the packing that holds the stem gave way, for a slide by the law would have gone elsewhere.
@@ -170,10 +167,9 @@ class StaticIdentification:
         if not law.valid or went_m > LONGEST_WAY * self._stroke_m:
             self._elsewhere = 0
             return False
-        should_m = local_balance.ahead_m(outcome, self._straight, self.balances)
+        should_m = self._balance.ahead_m(outcome)
         should_m /= 1.0 - law.swing
-        scatter_m = local_balance.scatter_m(self._straight, self.balances)
-        allowed_m = max(LIKE * abs(should_m), OFF * self._stroke_m + 3.0 * (scatter_m + outcome.std_m))
+        allowed_m = max(LIKE * abs(should_m), OFF * self._stroke_m + 3.0 * (self._balance.scatter_m + outcome.std_m))
         elsewhere = abs(went_m - should_m) > allowed_m
         if elsewhere and (gives := compliance(self.held, outcome.direction)) is not None and gives.explains(outcome):
             return True

@@ -36,7 +36,7 @@ from positioner.estimation.acceptance import Ratios
 from positioner.estimation.array import Array
 from positioner.estimation.estimates import Estimate, no_estimate
 from positioner.estimation.landings.landing_detector import SlideOutcome
-from positioner.estimation.landings.local_balance import KnownLaw, bent_by_pa
+from positioner.estimation.landings.local_balance import LocalBalance
 from positioner.estimation.landings.parting import FINEST
 from positioner.estimation.landings.swing import balanced, swing_of
 
@@ -194,15 +194,15 @@ def _short_m(slides: Sequence[SlideOutcome]) -> float:
     return max(median(each.short_m for each in slides if each.direction == s) for s in (1, -1))
 
 
-def _bent_by_pa(ratios: Ratios, slides: Sequence[SlideOutcome], stroke_m: float) -> float:
+def _bent_by_pa(ratios: Ratios, slides: tuple[SlideOutcome, ...], stroke_m: float) -> float:
     """Return how far the landings are bent away from the straight law over the middle of the travel, Pa.
 
     A standard deviation, of the direction in which it is more: landings may crowd where the law holds.
     """
     if ratios.b_over_c >= 0.0:
         return 0.0
-    law = KnownLaw(ratios, stroke_m)
-    off_pa = [[bent_by_pa(x * stroke_m, s, law, slides) for x in MIDDLE] for s in (1, -1)]
+    balance = LocalBalance(ratios=ratios, landings=slides, stroke_m=stroke_m)
+    off_pa = [[balance.bent_by_pa(x * stroke_m, s) for x in MIDDLE] for s in (1, -1)]
     return max(sqrt(sum(each**2 for each in one) / len(one)) for one in off_pa)
 
 

@@ -9,43 +9,38 @@ Where friction grows over the travel its static part grows alike, so d_s goes as
 
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
-from math import nan
+from functools import cached_property
 
 from config.extended_valve import ExtendedValve
 from positioner.control.laws.slides.slide_bounds import THRESHOLDS
 from positioner.estimation.acceptance import Ratios
 from positioner.estimation.landings.breakaway_distance import BreakawayDistance, Interval, Local
 from positioner.estimation.landings.landing_detector import VISIBLE, SlideOutcome
-from positioner.estimation.landings.local_balance import KnownLaw, bent_by_pa, known_law, landing_pa, scatter_m
+from positioner.estimation.landings.local_balance import LocalBalance
 from positioner.estimation.landings.packing_compliance import Compliance, compliance
 
 
-@dataclass(frozen=True, slots=True)
-class Balance:
-    """What the law knows of the valve: the straight law, the landings, and what held the stem; the latest first."""
+@dataclass(frozen=True, kw_only=True)
+class Balance(LocalBalance):
+    """What the law knows of the valve: where slides land, and what held the stem; the latest first."""
 
-    ratios: Ratios
-    landings: Sequence[SlideOutcome]
-    held: Sequence[SlideOutcome]
-    stroke_m: float
-    valve: ExtendedValve | None = None
-    """In place of the straight law, where its effects are known."""
-    now_s: float = 0.0
+    held: tuple[SlideOutcome, ...]
     swing: float = 0.0
     """ρ, share of its way by which the stem swings past its balance (estimation/landings/swing.py)."""
+
+    def is_made_of(
+        self,
+        ratios: Ratios,
+        landings: tuple[SlideOutcome, ...],
+        held: tuple[SlideOutcome, ...],
+        valve: ExtendedValve | None,
+    ) -> bool:
+        """Whether it is made of these very things: each is replaced whole when something is learnt."""
+        return self.ratios is ratios and self.landings is landings and self.held is held and self.valve is valve
 
     def slide_pa(self, from_m: float, to_m: float, direction: int) -> float:
         """Return the pressure under which a slide from rest ends at a place, Pa: at its balance, or swung past it."""
         return self.pressure_pa(to_m - self.swing * (to_m - from_m), direction, abs(to_m - from_m))
-
-    def pressure_pa(self, position_m: float, direction: int, way_m: float = nan) -> float:
-        """Return B(x, s), Pa, of a slide that goes so far, m; NaN: as far as the landings did."""
-        return landing_pa(position_m, direction, self.known, self.landings, way_m)
-
-    @property
-    def known(self) -> KnownLaw:
-        """B without what landings say of it."""
-        return known_law(self.ratios, self.stroke_m, self.valve, self.now_s)
 
     def compliance(self, direction: int) -> Compliance | None:
         """Return how far the packing gives way in a direction; None: it does not."""
@@ -60,11 +55,6 @@ class Balance:
     def stops_m(self) -> tuple[float, float]:
         """The ends of the travel, m, as far as is known."""
         return (0.0, self.stroke_m) if self.valve is None else self.valve.stops_m
-
-    @property
-    def scatter_m(self) -> float:
-        """How far slides land off the balance, a standard deviation, m."""
-        return scatter_m(self.known, self.landings)
 
     @property
     def friction_m(self) -> float:
@@ -87,9 +77,17 @@ class Balance:
 
     def local(self, position_m: float) -> Local:
         """Return what break-away distances at a place are of those in the middle of the travel."""
-        middle_m = THRESHOLDS.middle * self.stroke_m
-        up, down = (self.going_on_m(position_m, s) / self.going_on_m(middle_m, s) for s in (1, -1))
-        return Local(up, down, self.friction_at_m(position_m) / self.friction_at_m(middle_m))
+        there, middle = self._going(position_m), self._middle
+        return Local(*(each / in_the_middle for each, in_the_middle in zip(there, middle, strict=True)))
+
+    @cached_property
+    def _middle(self) -> tuple[float, float, float]:
+        return self._going(THRESHOLDS.middle * self.stroke_m)
+
+    def _going(self, position_m: float) -> tuple[float, float, float]:
+        """Return what slides up and down are in proportion to at a place, and what friction is, m."""
+        up_m, down_m = (self.going_on_m(position_m, s) for s in (1, -1))
+        return up_m, down_m, self.friction_at_m(position_m)
 
     def first_distances(self, guess_m: float, *, told: bool) -> BreakawayDistance:
         """Return the break-away distances before a slide of the law: those of the extended valve, or of the staircase.
@@ -130,6 +128,4 @@ class Balance:
 
     def _shape_pa(self, position_m: float, direction: int) -> float:
         """Return B as it goes over the travel, Pa, without what only the last landings near a place say."""
-        return self.known.landing_pa(position_m, direction) + bent_by_pa(
-            position_m, direction, self.known, self.landings
-        )
+        return self.known_pa(position_m, direction) + self.bent_by_pa(position_m, direction)

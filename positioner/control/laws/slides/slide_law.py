@@ -61,6 +61,8 @@ class SlideLaw:
 
     settings: SlideSettings
     memory: SlideMemory
+    balance: Balance | None = None
+    """By which it last commanded."""
 
     @property
     def command_pa(self) -> float:
@@ -74,15 +76,17 @@ class SlideLaw:
 
     def observe(self, seen: Seen) -> "SlideLaw":
         """Return the law after one sample."""
-        memory, settings = self.memory, self.settings
+        memory, settings, balance = self.memory, self.settings, self.balance
         if seen.dead_band_m != settings.dead_band_m:
             settings = replace(settings, dead_band_m=seen.dead_band_m)
         if seen.ratios is None:
             memory = let_go(memory, seen.command_pa, settings)
         elif seen.usable:
-            balance = balance_of(seen.ratios, seen.statics, settings.stroke_m, seen.sample.now_s)
+            balance = balance_after(balance, seen.ratios, seen, settings.stroke_m)
             memory = stepped(memory, observed(seen), seen.reference_m, balance, settings)
-        return self if memory is self.memory and settings is self.settings else SlideLaw(settings, memory)
+        if memory is self.memory and settings is self.settings and balance is self.balance:
+            return self
+        return SlideLaw(settings, memory, balance)
 
     def interrupted_pa(self, command_pa: float) -> float:
         """Return what to hold if something interrupts it after a command, Pa: of two slides the second."""
@@ -140,7 +144,19 @@ def first_distances(balance: Balance, bounds: SlideBounds) -> BreakawayDistance:
     return balance.first_distances(guess_m, told=told)
 
 
-def balance_of(ratios: Ratios, statics: StaticIdentification, stroke_m: float, now_s: float) -> Balance:
-    """Return what the law knows of the valve."""
-    swing = statics.law.swing if statics.valve is None else 0.0
-    return Balance(ratios, statics.balances, statics.held, stroke_m, statics.valve, now_s, swing)
+def balance_after(before: Balance | None, ratios: Ratios, seen: Seen, stroke_m: float) -> Balance:
+    """Return what the law knows of the valve: what it knew in the step before, where nothing has been learnt since."""
+    statics, valve = seen.statics, seen.statics.valve
+    drifts = valve is not None and valve.inverse.drift_per_s != 0.0
+    known = (ratios, statics.balances, statics.held, valve)
+    if before is not None and not drifts and before.is_made_of(*known):
+        return before
+    return Balance(
+        ratios=ratios,
+        landings=statics.balances,
+        stroke_m=stroke_m,
+        valve=valve,
+        now_s=seen.sample.now_s,
+        held=statics.held,
+        swing=statics.law.swing if valve is None else 0.0,
+    )

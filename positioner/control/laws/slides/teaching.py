@@ -103,7 +103,7 @@ def held(memory: SlideMemory, slide: Slide, now: "Now") -> SlideMemory:
     if memory.distances is None or memory.learnt is None or way_m <= 0.0:
         return memory
     row = memory.row or Row(memory.distances)
-    turning, local = slide.turning is not False, now.balance.local(now.reference_m)
+    turning, local = slide.turning is not False, now.local
     before = memory.learnt.at(slide.direction, turning=turning, local=local)
     if way_m >= before.broke_m:
         row = replace(row, held=row.held + 1, surely=row.surely + before.seen)
@@ -117,5 +117,5 @@ def _taught(memory: SlideMemory, slide: Slide, went: Went, now: "Now") -> SlideM
     if memory.distances is None or (slide.turning is None and went.moved):
         return memory
     turning = slide.turning is not False
-    local = now.balance.local(now.reference_m)
+    local = now.local
     return replace(memory, distances=memory.distances.taught(slide.direction, went, turning=turning, local=local))

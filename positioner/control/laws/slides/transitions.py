@@ -14,7 +14,8 @@ is what was known before the row.
 """
 
 from collections.abc import Callable
-from dataclasses import replace
+from dataclasses import dataclass, replace
+from functools import cached_property
 from typing import NamedTuple
 
 from config.codes import InhibitReason
@@ -38,6 +39,7 @@ from positioner.control.laws.slides.states import (
 )
 from positioner.control.laws.slides.stem_observation import StemObservation
 from positioner.control.laws.slides.teaching import sent_elsewhere, slid_away
+from positioner.estimation.landings.breakaway_distance import Local
 from positioner.estimation.landings.landing_detector import STOP
 from positioner.estimation.landings.stem_at_rest import Rest
 
@@ -46,13 +48,19 @@ COMMANDING = tuple(each for each in STATES if each is not Watching)
 UNDER_WAY = tuple(each for each in COMMANDING if each is not Stuck)
 
 
-class Now(NamedTuple):
+@dataclass
+class Now:
     """What one step is decided from."""
 
     seen: StemObservation
     reference_m: float
     balance: Balance
     bounds: SlideBounds
+
+    @cached_property
+    def local(self) -> Local:
+        """What break-away distances at the reference are of those in the middle of the travel."""
+        return self.balance.local(self.reference_m)
 
     def plan(self, memory: SlideMemory, from_m: float) -> Plan:
         """Return a plan for a stem that stands somewhere, m."""
@@ -61,7 +69,7 @@ class Now(NamedTuple):
             bounds=self.bounds,
             balance=self.balance,
             distances=memory.distances,
-            local=self.balance.local(self.reference_m),
+            local=self.local,
             anchor=memory.anchor,
             from_m=from_m,
             target_m=self.reference_m,
