@@ -45,7 +45,7 @@ bench: $(READY)         ## figures that depend on the machine, as ratios in one 
 	$(BIN)/python -m benchmarks
 
 campaign: $(READY)      ## every fault in every state on each bus: some twenty minutes, prints the table
-	$(BIN)/python -m benchmarks.campaign --document docs/reliability.md
+	$(BIN)/python -m benchmarks.campaign
 
 fuzz: $(READY)          ## every parser on ten million inputs, guided by coverage: some hours, prints the table
 	$(BIN)/python -m pip install --quiet --disable-pip-version-check --editable '.[fuzz]'

@@ -1,6 +1,6 @@
 """Every fault of device, wire and gateway in every state of the service, on each bus: does it end as documented?
 
-    python -m benchmarks.campaign [--buses modbus tls rtu canopen] [--every 1] [--document docs/reliability.md]
+    python -m benchmarks.campaign [--buses modbus tls rtu canopen] [--every 1]
         [--keep FILE...] [--only-kept]
 
 A case is a bus, a state, a safe action and a fault. The simulated valve is in lockstep, the gateway's clock is given,
@@ -60,7 +60,6 @@ RIGHT_WITHIN = 0.05
 BUSES = ("modbus", "tls", "rtu", "canopen")
 STATES = ("shadow", "standby", "manual", "S1 up", "S2 down", "S3", "fault")
 ACTIONS = ("hold", "vent")
-BEGIN, END = "<!-- campaign: written by `python -m benchmarks.campaign` -->", "<!-- end of the campaign -->"
 
 
 @dataclass(frozen=True, slots=True)
@@ -411,7 +410,6 @@ def main() -> int:
     parser.add_argument("--every", type=int, default=1, help="run every n-th case")
     parser.add_argument("--keep", type=Path, nargs="+", default=(), help="what was found; added to the first")
     parser.add_argument("--only-kept", action="store_true", help="the table of what was found so far")
-    parser.add_argument("--document", type=Path, help="write the table between its marks there")
     arguments = parser.parse_args()
     logging.disable(logging.CRITICAL)
     outcomes, kept = [], {case: each for path in arguments.keep for case, each in _kept(path).items()}
@@ -425,13 +423,7 @@ def main() -> int:
                 file.write(json.dumps([str(case), outcome.fault, outcome.cycles, outcome.violations]) + "\n")
         for violation in outcome.violations:
             print(f"{case}: {violation}", flush=True)
-    rows = table(outcomes)
-    print("\n".join(rows))
-    if arguments.document is not None:
-        text = arguments.document.read_text(encoding="utf-8")
-        head, _, rest = text.partition(BEGIN)
-        _, _, tail = rest.partition(END)
-        arguments.document.write_text("\n".join([head + BEGIN, *rows, END + tail]), encoding="utf-8")
+    print("\n".join(table(outcomes)))
     return 1 if any(outcome.violations for _, outcome in outcomes) else 0
 
 

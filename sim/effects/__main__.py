@@ -4,6 +4,7 @@ Without a file it prints the catalogue; with one it puts it between that file's 
 """
 
 import sys
+from collections import defaultdict
 from collections.abc import Iterator, Sequence
 from pathlib import Path
 
@@ -26,15 +27,16 @@ def catalogue() -> str:
 
 
 def _apart(effects: Sequence[Effect]) -> list[str]:
-    """Return what tells an effect from another, or from a parameter of the bare valve, each pair once."""
-    pairs = {
-        tuple(
-            sorted((effect.name, other))
-        ): f"- `{effect.name}`, `{other}`: {told or 'no record of pressure and position'}"
+    """Return what tells effects, or an effect and a parameter of the bare valve, apart, each behind its pairs."""
+    told = {
+        tuple(sorted((effect.name, other))): how or "no record of pressure and position"
         for effect in effects
-        for other, told in effect.confounded.items()
+        for other, how in effect.confounded.items()
     }
-    return [pairs[pair] for pair in sorted(pairs)]
+    pairs: dict[str, list[str]] = defaultdict(list)
+    for (one, other), how in sorted(told.items()):
+        pairs[how].append(f"`{one}` and `{other}`")
+    return [f"- {', '.join(each)}: {how}" for how, each in pairs.items()]
 
 
 def renewed(document: str) -> str:

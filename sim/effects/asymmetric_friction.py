@@ -11,8 +11,8 @@ from sim.effect import Parameter
 
 COMPLAINT = "sticks"
 LOOKS = (
-    "Opening and closing break away at, and slide against, different forces: in open loop the stem drifts one way "
-    "under a symmetric command."
+    "Opening and closing break away at, and slide against, different forces. Under a symmetric command in open loop "
+    "the stem drifts one way."
 )
 CONFOUNDED = {
     "asymmetric_viscosity": "moves at several speeds both ways: a viscosity grows with the speed, this does not",

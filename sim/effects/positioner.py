@@ -28,7 +28,7 @@ LOOKS = (
     "not depend on their height. What friction holds back comes late, with a jump, or overshoots."
 )
 CONFOUNDED = {
-    "coulomb_n": "measured actuator pressure: a dead band leaves it still, friction lets it rise; without it, whether "
+    "coulomb_n": "measured actuator pressure: a dead band leaves it still, friction lets it rise. Without it: whether "
     "the stem arrives with a jump or stops short",
     "static_n": "measured actuator pressure: a dead band leaves it still, friction lets it rise",
 }

@@ -22,8 +22,8 @@ HELD, BALANCED_N = 0, 1
 
 COMPLAINT = "sticks"
 LOOKS = (
-    "Small steps move the stuck stem a little, in proportion, and back again, before break-away; after a slip has "
-    "stopped it gives way when the pressure turns."
+    "Small steps move the stuck stem a little, in proportion, and back again, before break-away. After a slip it "
+    "gives way when the pressure turns."
 )
 CONFOUNDED = {
     "presliding_hysteresis": "small cycles of the pressure below break-away: a loop only if energy is lost",

@@ -13,7 +13,7 @@ from sim.effect import Parameter
 COMPLAINT = "air supply or leak"
 LOOKS = "Beyond a command, always the same one, the stem answers no further, at the upper end, at the lower or both."
 CONFOUNDED = {
-    "end_stop": "measured actuator pressure: the limit cuts it, a stop does not; without it, a load that moves the "
+    "end_stop": "measured actuator pressure: the limit cuts it, a stop does not. Without it: a load that moves the "
     "place where the stem halts moves only the limit's",
 }
 
