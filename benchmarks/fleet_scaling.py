@@ -30,7 +30,7 @@ from config.slave_file import Sensor
 from config.valve_file import ValveFile, load_valve
 from config.writing import write_valve
 from sim.composition import Composition
-from workbench.blind.hiding import drawn_valve
+from workbench.blind.hiding import draw_valve
 from workbench.blind.input_signal import excitation
 from workbench.blind.trial import NOISE_M, Trial
 from workbench.compare.comparison import compare
@@ -63,7 +63,7 @@ def _valve(folder: Path, name: str, seed: int) -> None:
     """Write a valve and its recordings; not one of a slip on a knife edge, by which few samples may be off."""
     for attempt in count():
         draw = np.random.default_rng([seed, attempt])
-        file = ValveFile(valve=drawn_valve(draw))
+        file = ValveFile(valve=draw_valve(draw))
         composition = Composition.from_file(file)
         trial = Trial(excitation(file.valve, draw, SAMPLES), PERIOD_S)
         clean_m = trial.answer_m(composition, composition.theta)

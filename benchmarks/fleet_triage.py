@@ -30,7 +30,7 @@ from workbench.blind.hiding import Hidden, hide, strength
 from workbench.blind.trial import Trial, refitted_rmse_m
 from workbench.compare.comparison import Comparison, compare
 from workbench.compare.measures import rms
-from workbench.fleet.examination import floor_to_reach_m, floors_allowed, is_structured, refit, refitted
+from workbench.fleet.examination import floor_to_reach_m, floors_allowed, is_structured, refit, refit_valve
 
 EDGES = (0.0, 0.25, 0.5, 0.75, 1.0, 1.5, 3.0, np.inf)
 VISIBLE = 0.5
@@ -50,7 +50,7 @@ def case(seed: int) -> Line:
     spring = refit(bare.fit, bare.base)
     known = spring[0].valve if spring else bare.base
     floor_m = spring[1].floor_m if spring else None
-    found, again = refitted(autumn, known)
+    found, again = refit_valve(autumn, known)
     trial = Trial(bare.test.command_pa, PERIOD_S)
     least_m = [rms(_answer_m(trial, valve) - clean_m) for valve in (known, found.valve)]
     least_m += refitted_rmse_m([trial], [_answer_m(trial, truth)], bare.truth)
@@ -59,7 +59,7 @@ def case(seed: int) -> Line:
         "effect": name,
         "strength": min(least_m) / rms(autumn.position_m - clean_m),
         "passes": _passes(floor_m, compare(autumn, known), again),
-        "bare_passes": _passes(floor_m, compare(bare.test, known), refitted(bare.test, known)[1]),
+        "bare_passes": _passes(floor_m, compare(bare.test, known), refit_valve(bare.test, known)[1]),
     }
 
 

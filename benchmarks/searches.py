@@ -37,7 +37,7 @@ from config.recording import Column, Recording
 from config.valve_file import ValveFile, ValveParameters
 from signals.moves import slips
 from sim.effect import first_effects
-from workbench.blind.hiding import drawn_effects, hide
+from workbench.blind.hiding import draw_effects, hide
 from workbench.data.record import ready
 from workbench.data.stretches import informative
 from workbench.fit.fitting import base_fit, fit
@@ -86,7 +86,7 @@ def cases(effects: Sequence[str], cases_each: int, kinds: Sequence[Kind], first_
 def drawn(seed: int) -> str:
     """Return the name of the effect that `hide` draws with a seed."""
     _, for_effects, *_ = map(np.random.default_rng, np.random.SeedSequence(seed).spawn(5))
-    return drawn_effects(for_effects, 1)[0].name
+    return draw_effects(for_effects, 1)[0].name
 
 
 @cache

@@ -19,7 +19,7 @@ NEEDED: Mapping[str, str] = {
 """What each of the others would need."""
 
 
-def required(actuator: Any) -> Any:
+def require_actuator(actuator: Any) -> Any:
     """Return it, unless it is known and not to be had.
 
     Raises:
@@ -30,5 +30,5 @@ def required(actuator: Any) -> Any:
     return actuator
 
 
-Actuator = Annotated[Literal["spring_return"], BeforeValidator(required)]
+Actuator = Annotated[Literal["spring_return"], BeforeValidator(require_actuator)]
 """One pressure against a spring."""

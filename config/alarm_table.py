@@ -29,7 +29,7 @@ CLASSED = {each.name.lower(): each for each in Ne107Cause if each not in BY_SUPE
 """The others, by their keys in `[alarms.ne107]`."""
 
 
-def _known(classes: dict[str, Ne107Letter]) -> dict[str, Ne107Letter]:
+def _check_known_causes(classes: dict[str, Ne107Letter]) -> dict[str, Ne107Letter]:
     for name in classes:
         if name not in CLASSED:
             raise ValueError(f"{name}: unknown cause; allowed here: {', '.join(CLASSED)}")
@@ -61,5 +61,5 @@ class AlarmsTable(Schema):
     """A test on the valve is due so often; 0: never."""
     shelve_limit_s: Positive = 28_800.0
     """The longest for which an alarm may be shelved."""
-    ne107: Annotated[dict[str, Ne107Letter], AfterValidator(_known)] = Field(default_factory=dict)
+    ne107: Annotated[dict[str, Ne107Letter], AfterValidator(_check_known_causes)] = Field(default_factory=dict)
     """The class of a cause, by its name in lower case."""

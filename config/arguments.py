@@ -57,14 +57,14 @@ def kinds_held(function: Callable[P, R]) -> Callable[P, R]:
     allowed = {name: _kinds_of(each.annotation) for name, each in parameters.items()}
 
     @wraps(function)
-    def held(*args: P.args, **kwargs: P.kwargs) -> R:
+    def check_arguments(*args: P.args, **kwargs: P.kwargs) -> R:
         for name, given in {**dict(zip(parameters, args, strict=False)), **kwargs}.items():
             wanted = allowed.get(name)
             if wanted and not any(each.allows(given) for each in wanted):
                 raise InputError(name, f"must be {' or '.join(map(str, wanted))}, got {_show_given(given, wanted)}")
         return function(*args, **kwargs)
 
-    return held
+    return check_arguments
 
 
 def _kinds_of(annotation: Any) -> tuple[_Wanted, ...]:

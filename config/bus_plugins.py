@@ -15,13 +15,13 @@ from pydantic import Tag, model_validator
 
 from config.device import Device
 from config.errors import InputError
-from config.loading import chosen_by
-from config.offered import offered, origin
+from config.loading import choose_by
+from config.offered import find_offers, origin
 
 DEVICES, DRIVERS = "positioner.devices", "positioner.drivers"
 
 
-def loaded(entry: EntryPoint) -> Any:
+def load_entry(entry: EntryPoint) -> Any:
     """Return what an entry point names.
 
     Raises:
@@ -42,7 +42,7 @@ def loaded(entry: EntryPoint) -> Any:
 def _schema(entry: EntryPoint) -> type[Device]:
     """Return the schema of a bus; one that cannot be loaded fails where a file uses it, not before."""
     try:
-        schema = loaded(entry)
+        schema = load_entry(entry)
     except InputError as error:
         reason = str(error)
     else:
@@ -63,7 +63,7 @@ if TYPE_CHECKING:
     AnyDevice = Device
 else:
     AnyDevice = Annotated[
-        Union[tuple(Annotated[_schema(entry), Tag(name)] for name, entry in offered(DEVICES, "bus").items())],  # noqa: UP007
-        chosen_by("bus", "modbus"),
+        Union[tuple(Annotated[_schema(entry), Tag(name)] for name, entry in find_offers(DEVICES, "bus").items())],  # noqa: UP007
+        choose_by("bus", "modbus"),
     ]
 """A device on any bus; `bus` says which."""

@@ -36,7 +36,7 @@ from config.loading import (
     Schema,
     Stroke,
     read_toml,
-    validated,
+    validate,
     wide,
 )
 from config.record_tables import HistoryTable, RecorderTable
@@ -46,13 +46,13 @@ from config.travel import ActionWord, Travel
 from config.travel_table import TravelTable
 
 
-def _written(network: object) -> object:
+def _check_network(network: object) -> object:
     if isinstance(network, int | float):  # which would be an address by its number
         raise ValueError("must be the address of a host or a network")
     return network
 
 
-Network = Annotated[IPvAnyNetwork, BeforeValidator(_written)]
+Network = Annotated[IPvAnyNetwork, BeforeValidator(_check_network)]
 
 
 class ValveTable(Schema):
@@ -432,7 +432,7 @@ def load_valves(path: Path) -> tuple[DaemonFile, ...]:
     numbered = enumerate(tables["valve"], 1)
     each_valve = (_tables_of_one(tables, entry, f"{source}: valve {number}") for number, entry in numbered)
     files = tuple(_validate(each, where, path.parent) for each, where in each_valve)
-    if problem := _conflict(files) or _crowded_line(files):
+    if problem := _conflict(files) or find_crowded_line(files):
         raise InputError(source, problem)
     return tuple(_beside_others(file, files) for file in files)
 
@@ -443,7 +443,7 @@ def _validate(tables: dict[str, Any], source: str, folder: Path) -> DaemonFile:
     if isinstance(valve, dict) and "travel_deg" in valve:
         require_degrees(tables.get("device"), source, "device")
         tables = {key: table if key == "valve" else in_si(table, source, key) for key, table in tables.items()}
-    return validated(DaemonFile, tables, source, folder)
+    return validate(DaemonFile, tables, source, folder)
 
 
 def _tables_of_one(tables: dict[str, Any], entry: Any, where: str) -> tuple[dict[str, Any], str]:
@@ -497,7 +497,7 @@ def _beside_others(file: DaemonFile, files: Sequence[DaemonFile]) -> DaemonFile:
     return file.model_copy(update={"device": device.model_copy(update={"shared_line": shares})})
 
 
-def _crowded_line(files: Sequence[DaemonFile]) -> str | None:
+def find_crowded_line(files: Sequence[DaemonFile]) -> str | None:
     """Say which valve has too short a cycle for the line that it shares with others.
 
     Each gets an equal share of the period, so that one that does not answer takes time from nobody but itself.

@@ -30,7 +30,7 @@ EXTRAS = {
 """The extra, by the name of the module that is missing."""
 
 
-def told(who: str, error: ModuleNotFoundError) -> str:
+def name_missing_extra(who: str, error: ModuleNotFoundError) -> str:
     """Return the line for a module that is missing: who needs it, and what to install; empty if no extra brings it."""
     missing = (error.name or "").partition(".")[0]
     if missing not in EXTRAS:
@@ -38,7 +38,7 @@ def told(who: str, error: ModuleNotFoundError) -> str:
     return f"{who} needs {missing}, which is not installed: pip install 'positioner[{EXTRAS[missing]}]'"
 
 
-def needed(module: str, who: str) -> Any:
+def import_extra(module: str, who: str) -> Any:
     """Import a module that an extra brings.
 
     Raises:
@@ -47,4 +47,4 @@ def needed(module: str, who: str) -> Any:
     try:
         return import_module(module)
     except ModuleNotFoundError as error:
-        raise ModuleNotFoundError(told(who, error) or str(error), name=error.name) from None
+        raise ModuleNotFoundError(name_missing_extra(who, error) or str(error), name=error.name) from None

@@ -111,14 +111,14 @@ SAID = {"path_type": "must be a path", "model_type": "must be a table"}
 S = TypeVar("S", bound=Schema)
 
 
-def chosen_by(key: str, default: str) -> Discriminator:
+def choose_by(key: str, default: str) -> Discriminator:
     """Let a key of a table choose among schemas, each annotated with its `Tag`; without the key, the default."""
 
-    def chosen(table: Any) -> Any:
+    def choose_tag(table: Any) -> Any:
         return table.get(key, default) if isinstance(table, dict) else getattr(table, key, default)
 
-    chosen.__name__ = key
-    return Discriminator(chosen)
+    choose_tag.__name__ = key
+    return Discriminator(choose_tag)
 
 
 def read_toml(path: Path) -> dict[str, Any]:
@@ -136,7 +136,7 @@ def read_toml(path: Path) -> dict[str, Any]:
         raise InputError(str(path), f"is not valid TOML: {str(error).partition(';')[0]}") from None
 
 
-def validated(schema: type[S], tables: dict[str, Any], source: str, folder: Path | None = None) -> S:
+def validate(schema: type[S], tables: dict[str, Any], source: str, folder: Path | None = None) -> S:
     """Hold tables against a schema; paths in them count from the folder, if one is given.
 
     Raises:
@@ -152,9 +152,9 @@ def load(schema: type[S], path: Path) -> S:
     """Read a TOML file into a schema.
 
     Raises:
-        InputError: as `read_toml` and `validated`.
+        InputError: as `read_toml` and `validate`.
     """
-    return validated(schema, read_toml(path), str(path), path.parent)
+    return validate(schema, read_toml(path), str(path), path.parent)
 
 
 def _one_line(schema: type[BaseModel], error: ValidationError) -> str:

@@ -12,7 +12,7 @@ from pathlib import Path
 from config.errors import InputError
 
 
-def locked(path: Path, said: str) -> int:
+def take_lock(path: Path, said: str) -> int:
     """Return the descriptor of the lock; closed, it is free.
 
     Args:

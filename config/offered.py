@@ -5,7 +5,7 @@ from importlib.metadata import EntryPoint, entry_points
 from config.errors import InputError
 
 
-def offered(group: str, kind: str) -> dict[str, EntryPoint]:
+def find_offers(group: str, kind: str) -> dict[str, EntryPoint]:
     """Return what is offered in a group, by name; `kind` says what that is: "bus".
 
     Raises:

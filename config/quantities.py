@@ -46,7 +46,7 @@ def _numbers(codes: type[IntEnum]) -> str:
     return ", ".join(f"{int(each)} {_words(each.name)}" for each in codes)
 
 
-def listed_bits(flags: type[IntFlag]) -> str:
+def list_bits(flags: type[IntFlag]) -> str:
     """Return `number name, number name, ...` of all bits."""
     return ", ".join(f"{each.bit_length() - 1} {_words(each.name)}" for each in flags)
 
@@ -60,7 +60,7 @@ QUANTITIES = (
     Quantity("pressure_pa", "Pa", "float32", False, "actuator pressure"),
     Quantity("sample_counter", "1", "uint32", False, "samples taken since power-up, wraps"),
     Quantity("device_time_us", "us", "uint64", False, "device's clock at the sample"),
-    Quantity("status", "1", "uint16", False, f"bits: {listed_bits(DeviceStatus)}"),
+    Quantity("status", "1", "uint16", False, f"bits: {list_bits(DeviceStatus)}"),
     Quantity("command_pa", "Pa", "float32", True, "pressure command"),
     Quantity("communication_timeout_s", "s", "float32", True, "silence before the action; 0 is never"),
     Quantity("communication_action", "1", "uint16", True, _numbers(CommunicationAction)),

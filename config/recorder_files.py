@@ -24,7 +24,7 @@ def files_of(folder: Path, name: str) -> list[Path]:
 
 def files_of_stem(folder: Path, stem: str) -> list[Path]:
     """Return the same by what their names begin with."""
-    found = all_files(folder, stem) - compressed_already(folder, stem)
+    found = all_files(folder, stem) - find_compressed_twins(folder, stem)
     return sorted(found, key=lambda each: (number_of(each), each))
 
 
@@ -35,7 +35,7 @@ def all_files(folder: Path, stem: str) -> set[Path]:
     return {each for each in folder.iterdir() if mine.fullmatch(each.name)}
 
 
-def compressed_already(folder: Path, stem: str) -> set[Path]:
+def find_compressed_twins(folder: Path, stem: str) -> set[Path]:
     """Return the plain files whose compressed twin is whole: for a moment, or after a crash, both are there."""
     found = all_files(folder, stem)
     return {each for each in found if each.with_name(f"{each.name}.gz") in found}

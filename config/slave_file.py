@@ -12,7 +12,7 @@ from config.device import Host
 from config.drive import ROTARY, in_si, require_degrees
 from config.errors import InputError
 from config.file_kinds import require_kind
-from config.loading import SHIPPED, Many, NonNegative, Port, Positive, Pressure, Schema, chosen_by, read_toml, validated
+from config.loading import SHIPPED, Many, NonNegative, Port, Positive, Pressure, Schema, choose_by, read_toml, validate
 from config.modbus_map import SIMULATED_MAP, ModbusMap
 from config.quantities import ActionName
 from config.serial_port import RtuUnit, SerialPort
@@ -53,7 +53,7 @@ AnyBus = Annotated[
     Annotated[ModbusTcpBus, Tag("modbus")]
     | Annotated[ModbusRtuBus, Tag("rtu")]
     | Annotated[CanopenBus, Tag("canopen")],
-    chosen_by("kind", "modbus"),
+    choose_by("kind", "modbus"),
 ]
 """A slave's place on any bus; `kind` says which."""
 
@@ -192,7 +192,7 @@ def load_slave(path: Path) -> SlaveFile:
     if _turns(tables.get("valve"), path):
         require_degrees(tables.get("bus"), str(path), "bus")
         tables = in_si(tables, str(path))
-    return validated(SlaveFile, tables, str(path), path.parent)
+    return validate(SlaveFile, tables, str(path), path.parent)
 
 
 def _turns(valve: object, path: Path) -> bool:

@@ -8,13 +8,13 @@ from pathlib import Path
 from typing import Any
 
 from config.errors import InputError
-from config.loading import validated
+from config.loading import validate
 from config.valve_file import EffectTable, ValveFile, ValveParameters
 
 FIXED = ("name", "kind", "actuator")
 
 
-def changed_valve(file: ValveFile, values: Mapping[str, float], without: Collection[str] = ()) -> ValveFile:
+def change_valve(file: ValveFile, values: Mapping[str, float], without: Collection[str] = ()) -> ValveFile:
     """Return a valve file with these values, and without these effects.
 
     Raises:
@@ -33,7 +33,7 @@ def changed_valve(file: ValveFile, values: Mapping[str, float], without: Collect
         effect, _, key = name.rpartition(".")
         (tables[effect] if effect else base)[key] = value
     kept: list[Any] = [table for name, table in tables.items() if name not in without]
-    return validated(ValveFile, {"valve": base, "effect": kept}, "valve")
+    return validate(ValveFile, {"valve": base, "effect": kept}, "valve")
 
 
 def _name(table: EffectTable) -> str:

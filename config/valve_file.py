@@ -19,7 +19,7 @@ from config.arguments import kinds_held
 from config.drive import KINDS, ROTARY, VALVE, Kind, KindName
 from config.errors import InputError
 from config.file_kinds import require_kind
-from config.loading import SHIPPED, Many, Schema, Stroke, between, read_toml, validated
+from config.loading import SHIPPED, Many, Schema, Stroke, between, read_toml, validate
 
 Strength = Annotated[float, between(1e-12, 1e12, or_zero=True)]
 """Of a spring or a friction, N/m, N s/m, N, or what a drive has in their place."""
@@ -101,7 +101,7 @@ def load_valve(path: Path | str) -> ValveFile:
     path = Path(path)
     tables = read_toml(path)
     require_kind(tables, "valve", str(path))
-    file = _drive(tables, str(path)) if "drive" in tables else validated(ValveFile, tables, str(path), path.parent)
+    file = _drive(tables, str(path)) if "drive" in tables else validate(ValveFile, tables, str(path), path.parent)
     return file.model_copy(update={"effect": tuple(each.seen_from(path.parent) for each in file.effect)})
 
 
@@ -133,7 +133,7 @@ def _drive(tables: Mapping[str, Any], source: str) -> ValveFile:
     if isinstance(rest.get("effect"), list):
         rest["effect"] = [_of_valve(kind, each, source) for each in rest["effect"]]
     try:
-        return validated(ValveFile, {"valve": said, **rest}, source)
+        return validate(ValveFile, {"valve": said, **rest}, source)
     except InputError as error:
         raise InputError(source, re.sub(r"^valve\b", "drive", kind.text(error.problem))) from None
 
@@ -148,7 +148,7 @@ def _of_valve(kind: Kind, table: Any, source: str) -> Any:
     return {kind.of_valve(key): value for key, value in table.items()}
 
 
-def moved_by_air(file: ValveFile, source: str, who: str) -> ValveFile:
+def require_air(file: ValveFile, source: str, who: str) -> ValveFile:
     """Return the file of a valve, with a stem or one that turns, to one who knows no drive that no pressure moves.
 
     Raises:

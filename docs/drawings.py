@@ -14,7 +14,7 @@ from matplotlib.axes import Axes
 
 from config.codes import Mode
 from config.daemon_file import DaemonFile
-from config.loading import validated
+from config.loading import validate
 from config.slave_file import SlaveFile
 from config.valve_file import load_valve, shipped_valve
 from drivers.in_memory import MemoryDriver
@@ -78,7 +78,7 @@ def run() -> Iterator[Row]:
     path = shipped_valve("seed")
     valve = load_valve(path).valve
     most_pa = 1.5 * (valve.static_n + valve.spring_n_per_m * valve.stroke_m) / valve.diaphragm_area_m2
-    daemon = validated(
+    daemon = validate(
         DaemonFile,
         {
             "valve": {"name": valve.name, "stroke_m": valve.stroke_m},
@@ -88,7 +88,7 @@ def run() -> Iterator[Row]:
         "docs",
     )
     clock = {"clock": {"mode": "lockstep", "period_s": PERIOD_S}, "supply": {"maximum_pa": most_pa}}
-    slave = validated(SlaveFile, {**clock, "sensor": {"noise_std_m": NOISE_M, "seed": 1}}, "docs")
+    slave = validate(SlaveFile, {**clock, "sensor": {"noise_std_m": NOISE_M, "seed": 1}}, "docs")
     settings = Settings.of(daemon)
     link = Link(MemoryDriver(device_of(slave, path)), DevicePace(), LinkSettings(travel=daemon.valve.travel))
     held_pa, _ = link.open()

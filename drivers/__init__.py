@@ -10,10 +10,10 @@
 `driver_for` finds drivers by the name of their bus, those of other packages too (`config.bus_plugins`).
 """
 
-from config.bus_plugins import DRIVERS, loaded
+from config.bus_plugins import DRIVERS, load_entry
 from config.device import Device
 from config.errors import InputError
-from config.offered import offered
+from config.offered import find_offers
 from drivers.boundary import Driver
 
 
@@ -23,9 +23,9 @@ def driver_for(device: Device) -> Driver:
     Raises:
         InputError: no installed package has one, or it cannot be loaded.
     """
-    drivers = offered(DRIVERS, "bus")
+    drivers = find_offers(DRIVERS, "bus")
     if device.bus not in drivers:
         known = ", ".join(sorted(drivers))
         raise InputError("device.bus", f"{device.bus}: no installed package has its driver; there are: {known}")
-    driver: Driver = loaded(drivers[device.bus])(device)
+    driver: Driver = load_entry(drivers[device.bus])(device)
     return driver

@@ -150,12 +150,12 @@ def _loaded(name: str) -> object:
 
     if said := in_the_way():
         raise ImportError(f"positioner.{name}: {said}")
-    from config.extras import told
+    from config.extras import name_missing_extra
 
     try:
         found = getattr(import_module(_LIVES_IN[name]), name)
     except ModuleNotFoundError as error:
-        if said := told(f"positioner.{name}", error):
+        if said := name_missing_extra(f"positioner.{name}", error):
             raise ModuleNotFoundError(said, name=error.name) from None
         raise
     globals()[name] = found

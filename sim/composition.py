@@ -13,7 +13,7 @@ import numpy as np
 
 from config.drive import Kind
 from config.errors import InputError
-from config.loading import validated
+from config.loading import validate
 from config.valve_file import ValveFile, ValveParameters
 from sim.effect import SHIPPED, Effect, find_effect
 from sim.karnopp import MEMORY, Vector
@@ -143,7 +143,7 @@ class Composition:
                 raise InputError(self.source, f"{name}: unknown parameter; there are: {', '.join(self.names)}")
         values: dict[str, Any] = {**dict(zip(self.names, theta.tolist(), strict=True)), **parameters}
         base = {"name": self.valve.name, "stroke_m": self.valve.stroke_m} | {name: values[name] for name in BASE}
-        validated(ValveParameters, base, self.source)
+        validate(ValveParameters, base, self.source)
         for effect in self.effects:
             written = {key: values[f"{effect.name}.{key}"] for key in effect.parameters}
             _values(effect, written, f"{self.source}: effect {effect.name}", self.valve.own)
@@ -161,7 +161,7 @@ class Composition:
             {"name": each.written} | {key: values[f"{each.name}.{key}"] for key in each.parameters}
             for each in self.effects
         ]
-        return validated(ValveFile, {"valve": base, "effect": tables}, self.source)
+        return validate(ValveFile, {"valve": base, "effect": tables}, self.source)
 
 
 def _values(effect: Effect, written: Mapping[str, Any], source: str, kind: Kind) -> tuple[float, ...]:

@@ -5,7 +5,7 @@ import numpy.typing as npt
 
 from config.arguments import kinds_held
 from config.errors import InputError
-from config.loading import validated
+from config.loading import validate
 from config.recording import Column, Recording, of_kind
 from config.slave_file import Sensor
 from config.valve_file import ValveFile
@@ -50,7 +50,7 @@ def simulate(
         )
     if not (np.diff(time) > 0.0).all():
         raise InputError("simulate", "time_s must increase strictly")
-    sensor = validated(Sensor, {"noise_std_m": float(noise_std_m), "seed": int(seed)}, "sensor")
+    sensor = validate(Sensor, {"noise_std_m": float(noise_std_m), "seed": int(seed)}, "sensor")
     simulated = Valve.from_file(valve)
     response = simulated.run(command[:-1], np.diff(time))
     transmitter = Transmitter(sensor)

@@ -20,7 +20,7 @@ import numpy as np
 
 from config.errors import InputError
 from config.extended_valve import ExtendedValve, Inverse, Table
-from config.valve_file import ValveFile, moved_by_air
+from config.valve_file import ValveFile, require_air
 from sim.composition import SPRING, parameter_vector
 from sim.effect import BALANCE, Effect, find_effect
 from sim.interpreted import interpreted
@@ -47,7 +47,7 @@ def extended_valve(file: ValveFile, source: str) -> ExtendedValve:
         InputError: an effect that is unknown or declares no inverse, a parameter unknown, missing or out of its range,
             a table that does not rise with the position, a function of an own effect that fails.
     """
-    moved_by_air(file, source, "the daemon commands none")
+    require_air(file, source, "the daemon commands none")
     effects = [find_effect(each.name, source) for each in file.effect]
     for each in effects:
         if not each.in_balance and each.inverse is None:

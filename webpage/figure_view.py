@@ -59,7 +59,7 @@ class FigureView:
     def _themed(self) -> Figure:
         ink = self._theme.ink
         changed = {getattr(LIGHT, each.name): getattr(ink, each.name) for each in fields(Ink)}
-        figure = _recoloured(self._draw(), changed)
+        figure = _recolour(self._draw(), changed)
         layout = dict(figure.get("layout", {}))
         layout |= {
             "margin": {**layout["margin"], "t": max(BAR_PX, layout["margin"]["t"])},
@@ -76,10 +76,10 @@ class FigureView:
         return {"data": figure["data"], "layout": layout, "config": CONFIG}
 
 
-def _recoloured(part: Any, colours: Mapping[str, str]) -> Any:
+def _recolour(part: Any, colours: Mapping[str, str]) -> Any:
     """Return a figure, or a part of it, with the light theme's colours changed to those of the theme."""
     if isinstance(part, dict):
-        return {key: _recoloured(value, colours) for key, value in part.items()}
+        return {key: _recolour(value, colours) for key, value in part.items()}
     if isinstance(part, list) and part and isinstance(part[0], dict):
-        return [_recoloured(each, colours) for each in part]
+        return [_recolour(each, colours) for each in part]
     return colours.get(part, part) if isinstance(part, str) else part

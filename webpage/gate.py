@@ -118,7 +118,7 @@ class Gate:
             return
         read = 0
 
-        async def counted() -> Message:
+        async def count_body() -> Message:
             nonlocal read
             message = await receive()
             if message["type"] == "http.request":
@@ -132,7 +132,7 @@ class Gate:
                 message["headers"] = [*message.get("headers", ()), *HEADERS]
             await send(message)
 
-        await self.app(scope, counted, with_headers)
+        await self.app(scope, count_body, with_headers)
 
     def _said(self, said: str, form: str = "") -> bytes:
         return FORM.format(title=escape(self.title), said=escape(said), form=form).encode()

@@ -58,7 +58,7 @@ def serve(title: str, build: Callable[[], Awaitable[None]], where: Listening, *,
     """
     if not where.password and not where.is_own:
         raise InputError(where.host, "can be reached by others: to listen there needs a password, --password-file FILE")
-    bound = _bound(where)
+    bound = _bind(where)
     port = bound.getsockname()[1]
     key = secrets.token_urlsafe(24)
     ui.page("/", title=title)(build)
@@ -68,7 +68,7 @@ def serve(title: str, build: Callable[[], Awaitable[None]], where: Listening, *,
     )
     sign_in = SignIn({"": Password.of(where.password)}) if where.password else None
     gate = Gate(outer, title, f"positioner_{port}", key, sign_in, MOST_BYTES)
-    address = f"http://{_shown(where.host)}:{port}/" + ("" if sign_in else f"?{KEY}={key}")
+    address = f"http://{_spell_host(where.host)}:{port}/" + ("" if sign_in else f"?{KEY}={key}")
     print(f"{title}: {address}", flush=True)
     if opens_browser:
         app.on_startup(lambda: webbrowser.open(address))
@@ -76,7 +76,7 @@ def serve(title: str, build: Callable[[], Awaitable[None]], where: Listening, *,
     uvicorn.Server(config).run([bound])
 
 
-def _bound(where: Listening) -> socket.socket:
+def _bind(where: Listening) -> socket.socket:
     ports = [PORT, 0] if where.port is None else [where.port]
     for port in ports:
         try:
@@ -91,5 +91,5 @@ def _family(host: str) -> socket.AddressFamily:
     return socket.AF_INET6 if ":" in host else socket.AF_INET
 
 
-def _shown(host: str) -> str:
+def _spell_host(host: str) -> str:
     return f"[{host}]" if ":" in host else host

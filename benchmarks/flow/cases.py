@@ -11,7 +11,7 @@ from benchmarks.flow.loop import FlowController, FlowLoop, FlowProcess
 from config.codes import Mode
 from config.daemon_file import DaemonFile
 from config.errors import CommandFailed
-from config.loading import validated
+from config.loading import validate
 from config.slave_file import SlaveFile
 from config.valve_file import load_valve, shipped_valve
 from positioner.control.requests import QUIET, Requests
@@ -118,7 +118,7 @@ def flow_files(case: FlowCase) -> tuple[DaemonFile, SlaveFile]:
         "clock": {"mode": "lockstep", "period_s": case.period_s},
         "sensor": {"noise_std_m": NOISE_PU * STROKE_M, "seed": 1},
     }
-    return validated(DaemonFile, daemon, case.title), validated(SlaveFile, slave, case.title)
+    return validate(DaemonFile, daemon, case.title), validate(SlaveFile, slave, case.title)
 
 
 def _controller(case: FlowCase) -> FlowController:

@@ -25,7 +25,7 @@ from benchmarks.paper.scenario import (
     derivative_window_s,
 )
 from config.errors import InputError
-from config.loading import validated
+from config.loading import validate
 from config.valve_file import ValveFile, ValveParameters
 from positioner.estimation import Ratios
 from positioner.estimation.array import Array
@@ -325,7 +325,7 @@ def largest_sample_pu(noise: Noise, run: ScenarioRun) -> float:
 def refusal_of_printed_static_friction(valve: ValveParameters) -> str:
     """Return the error of a valve file with F_s as printed; empty if it is accepted."""
     try:
-        validated(ValveParameters, valve.model_dump() | {"static_n": PRINTED_STATIC_N}, "F_s as printed")
+        validate(ValveParameters, valve.model_dump() | {"static_n": PRINTED_STATIC_N}, "F_s as printed")
     except InputError as error:
         return str(error)
     return ""

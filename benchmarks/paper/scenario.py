@@ -17,7 +17,7 @@ import numpy as np
 
 from config.codes import Mode
 from config.daemon_file import DaemonFile
-from config.loading import validated
+from config.loading import validate
 from config.slave_file import SlaveFile
 from config.valve_file import ValveFile
 from positioner.control.requests import QUIET, Requests
@@ -209,7 +209,7 @@ def _daemon(period_s: float, stroke_m: float) -> DaemonFile:
         "control": {"law": "seed"},
         "identification": {"derivative_window_s": derivative_window_s(period_s)},
     }
-    return validated(DaemonFile, tables, "the seed's scenario")
+    return validate(DaemonFile, tables, "the seed's scenario")
 
 
 def _slave(noise: Noise, period_s: float, stroke_m: float) -> SlaveFile:
@@ -217,4 +217,4 @@ def _slave(noise: Noise, period_s: float, stroke_m: float) -> SlaveFile:
         "clock": {"mode": "lockstep", "period_s": period_s},
         "sensor": {"noise_std_m": noise.white_std_pu * stroke_m, "seed": 1},
     }
-    return validated(SlaveFile, tables, "the seed's scenario")
+    return validate(SlaveFile, tables, "the seed's scenario")

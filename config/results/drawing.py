@@ -11,7 +11,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 from numpy.typing import ArrayLike
 
-from config.extras import needed
+from config.extras import import_extra
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
@@ -26,7 +26,7 @@ TICKS = (1.0, 2.0, 5.0)
 
 def panels(heights: Sequence[float]) -> "tuple[Figure, Sequence[Axes]]":
     """Return a figure with panels one below the other, heights in inches, over one horizontal axis."""
-    pyplot = needed("matplotlib.pyplot", "plot")
+    pyplot = import_extra("matplotlib.pyplot", "plot")
     figure, axes = pyplot.subplots(
         len(heights),
         sharex=True,

@@ -12,7 +12,7 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from config.extras import needed
+from config.extras import import_extra
 
 if TYPE_CHECKING:
     from matplotlib.figure import Figure
@@ -72,7 +72,7 @@ class Result(ABC):
         Raises:
             ModuleNotFoundError: pandas is not installed (extra `frame`).
         """
-        frame: DataFrame = needed("pandas", "to_frame").DataFrame(dict(self.frame_columns()))
+        frame: DataFrame = import_extra("pandas", "to_frame").DataFrame(dict(self.frame_columns()))
         return frame
 
     def _repr_html_(self) -> str:

@@ -23,12 +23,12 @@ def run(arguments: argparse.Namespace) -> int:
     from threading import Event
 
     from config.errors import InputError
-    from config.extras import needed
+    from config.extras import import_extra
     from northbound.served_valves import places_in
     from positioner.cli.parts.daemon_address import client_tls
     from webpage.listening_arguments import require_port
 
-    needed("prometheus_client", "positioner metrics")
+    import_extra("prometheus_client", "positioner metrics")
     from northbound.metrics.exporter import serve_metrics
     from northbound.metrics.scraped_valve import ScrapedValve
 

@@ -86,7 +86,7 @@ def what_happened(
     return WhatHappened(tuple(newest_first[:most]), source)
 
 
-def served_event(valve: str, values: Mapping[str, float]) -> Event | None:
+def read_event(valve: str, values: Mapping[str, float]) -> Event | None:
     """Return the newest event that a daemon serves, None before its first, or of a daemon that serves none."""
     number = values.get("event_number", math.nan)
     if not number > 0:

@@ -48,18 +48,18 @@ def last_moves(
         wall_s: now on the clock that files are stamped by.
         travel: of the valve: a recording has the stem, and what is returned counts from the closed end.
     """
-    recording = None if folder is None else recorded_tail(folder, view.name, seconds, wall_s)
+    recording = None if folder is None else read_tail(folder, view.name, seconds, wall_s)
     if recording is not None and travel is not None and travel.closes:
         turned = {name: travel.stroke_m - recording.columns[name] for name in COUNTED & recording.columns.keys()}
         recording = Recording({**recording.columns, **turned})
     source = "the daemon's recording, at its full rate"
     if recording is None:
-        recording = polled(view.trend(now_s - seconds))
+        recording = join_polls(view.trend(now_s - seconds))
         source = "as polled: the daemon's recording is off, not on this machine, or not written any more"
     return None if recording is None else LastMoves(recording, source, respond(recording))
 
 
-def polled(trend: dict[str, Column]) -> Recording | None:
+def join_polls(trend: dict[str, Column]) -> Recording | None:
     """Return what was polled as a recording, without what was lost; None where there is nothing."""
     whole = np.isfinite(trend["position_m"]) & np.isfinite(trend["command_pa"])
     if not whole.any():
@@ -67,7 +67,7 @@ def polled(trend: dict[str, Column]) -> Recording | None:
     return Recording({name: column[whole] for name, column in trend.items() if name != WAITING})
 
 
-def recorded_tail(folder: Path, valve: str, seconds: float, wall_s: float) -> Recording | None:
+def read_tail(folder: Path, valve: str, seconds: float, wall_s: float) -> Recording | None:
     """Return the last seconds that were recorded; None where no recording is written, or none can be read."""
     try:
         newest = files_of(folder, valve)[-2:]

@@ -85,7 +85,7 @@ def bands(time_s: Column, state: Column) -> list[Band]:
     ]
 
 
-def thinned(columns: Mapping[str, Column], step_s: float) -> dict[str, Column]:
+def thin_columns(columns: Mapping[str, Column], step_s: float) -> dict[str, Column]:
     """Return at most three rows a step of time, s: the least and the greatest position in it, and where one is missing.
 
     >>> rows = {"time_s": np.array([0.0, 0.1, 0.2, 1.0, 2.0]), "position_m": np.array([3.0, 1.0, 2.0, 5.0, np.nan])}

@@ -173,12 +173,12 @@ class ValveCommands:
             show: called with the progress, 0 to 1.
         """
 
-        def shown(progress: float) -> None:
+        def show_progress(progress: float) -> None:
             if self._break_off.is_set():
                 raise BrokenOff("broken off; the law has the command again")
             show(progress)
 
-        def identified(dcs: Dcs) -> Confirmation:
+        def identify(dcs: Dcs) -> Confirmation:
             for permissive in identify_permissives(self._picture().values):
                 if not permissive.holds:
                     return Confirmation(False, permissive.remedy)
@@ -186,12 +186,12 @@ class ValveCommands:
                 return Confirmation(False, "an identification is under way already")
             try:
                 self._break_off.clear()
-                problem = dcs.identify(excitation, IDENTIFY_WITHIN_S, shown)
+                problem = dcs.identify(excitation, IDENTIFY_WITHIN_S, show_progress)
             finally:
                 self._identifying.release()
             return Confirmation(problem is None, f"not applied: {problem}" if problem else "identified and applied")
 
-        return self._within_rights(role, (*EXCITATION, *excitation), identified)
+        return self._within_rights(role, (*EXCITATION, *excitation), identify)
 
     def break_off(self) -> None:
         """Break off the identification that is under way, if one is."""

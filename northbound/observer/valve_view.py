@@ -12,7 +12,7 @@ from threading import Lock
 
 from config.recording import Column
 from northbound.observer.freshness import Freshness, FreshnessMemory, after_failure, after_reading, freshness
-from northbound.observer.happened import SeenEvent, served_event
+from northbound.observer.happened import SeenEvent, read_event
 from northbound.observer.trends import Trend
 from northbound.observer.words import code_text
 from positioner.history.entries import Event
@@ -106,7 +106,7 @@ class ValveView:
             for text in _changes(before, values):
                 self._events.appendleft(SeenEvent(time_s, text))
             self._values = {**before, **values}
-            event = served_event(self.name, values)
+            event = read_event(self.name, values)
             if event is not None and (not self._served or self._served[-1] != event):
                 self._served.append(event)
             if "position_m" in values:

@@ -39,7 +39,7 @@ def run(arguments: argparse.Namespace) -> int:
         InputError: a fault in a file; no users, no keys; it cannot listen there.
     """
     from config.errors import InputError
-    from config.extras import needed
+    from config.extras import import_extra
     from config.passwords import SignIn
     from config.role_passwords import read_passwords
 
@@ -53,7 +53,7 @@ def run(arguments: argparse.Namespace) -> int:
     require_port("--listen-port", arguments.listen_port)
     sign_in = SignIn(read_passwords(arguments.users))
     places = list(places_in(files, *certificates(arguments)))
-    needed("asyncua", "positioner opcua")
+    import_extra("asyncua", "positioner opcua")
     from northbound.observer.watched_valves import watching
     from northbound.opcua.application_keys import ApplicationKeys
     from northbound.opcua.valve_server import Listening, application_uri, serve_opcua

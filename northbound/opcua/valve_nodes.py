@@ -85,7 +85,7 @@ class Shown(NamedTuple):
     why: Why
 
 
-def shown(picture: ValvePicture) -> Iterator[Shown]:
+def show_picture(picture: ValvePicture) -> Iterator[Shown]:
     """Yield what the nodes show of what is known of a valve."""
     for node, value, measured in _values(picture):
         if not picture.freshness.live:
@@ -99,7 +99,7 @@ def shown(picture: ValvePicture) -> Iterator[Shown]:
     yield Shown("Status.Connection", picture.freshness.daemon or picture.freshness.measurement or "of now", Why.GOOD)
 
 
-def refused(picture: ValvePicture) -> Iterator[Shown]:
+def show_refusals(picture: ValvePicture) -> Iterator[Shown]:
     """Yield why each estimate is refused; empty where it is valid."""
     for each in estimates_in_words(picture.values):
         live = picture.freshness.live

@@ -31,7 +31,7 @@ from northbound.opcua.guarded_session import Door, GuardedServer
 from northbound.opcua.recorded_history import BY_HOUR, BY_IDENTIFICATION, Recorded, RecordedHistory, event_of
 from northbound.opcua.told_events import ToldEvents
 from northbound.opcua.valve_desk import ValveDesk
-from northbound.opcua.valve_nodes import IDENTIFICATION, POSITION, SETPOINT, Shown, Why, refused, shown
+from northbound.opcua.valve_nodes import IDENTIFICATION, POSITION, SETPOINT, Shown, Why, show_picture, show_refusals
 
 PUBLISH_EVERY_S = 0.25
 SERVER = ua.NodeId(ua.ObjectIds.Server)
@@ -189,7 +189,7 @@ async def _keep_writing(
                 for emitted_by in (space.node_id(), SERVER):
                     made = event_of(event, space.node_id(), event_type, emitted_by)
                     await server.iserver.subscription_service.trigger_event(made)
-            for each in (*shown(picture), *refused(picture)):
+            for each in (*show_picture(picture), *show_refusals(picture)):
                 if before.get((space.name, each.node)) != each:
                     before[space.name, each.node] = each
                     await server.write_attribute_value(space.node_id(each.node), _data_value(each, space))

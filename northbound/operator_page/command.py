@@ -67,13 +67,13 @@ def _places(arguments: argparse.Namespace) -> "Iterator[Place]":
     """
     from config.daemon_file import SupervisoryTable
     from config.errors import InputError
-    from config.loading import validated
+    from config.loading import validate
     from northbound.observer.watched_valves import Place
 
     tls, tls_of = certificates(arguments)
     said = [key for key in ("host", "port", "unit") if getattr(arguments, key) is not None]
     if arguments.config is None:
-        where = validated(SupervisoryTable, {key: getattr(arguments, key) for key in said}, "the daemon", Path())
+        where = validate(SupervisoryTable, {key: getattr(arguments, key) for key in said}, "the daemon", Path())
         yield Place(f"{where.host}:{where.port}", where.host, where.port, where.unit, tls=tls, tls_of=tls_of)
         return
     if said:

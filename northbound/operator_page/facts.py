@@ -133,7 +133,7 @@ def estimates(picture: ValvePicture, stroke_m: float, units: Units) -> list[Fact
     ]
 
 
-def happened(lines: Iterable[Happened]) -> Iterator[str]:
+def list_events(lines: Iterable[Happened]) -> Iterator[str]:
     """Yield a line an event: when, by this machine's clock and zone, what, and its NE 107 class unless that is good."""
     for line in lines:
         when = time.strftime("%Y-%m-%d %H:%M:%S %Z", time.localtime(line.time_s))

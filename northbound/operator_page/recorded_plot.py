@@ -11,7 +11,7 @@ import numpy as np
 from nicegui import events, ui
 
 from config.recording import Column, Recording
-from northbound.observer.trends import thinned
+from northbound.observer.trends import thin_columns
 from northbound.operator_page.marks import DASHES
 from webpage.theme import Theme
 from webpage.units import Unit, Units
@@ -72,7 +72,7 @@ class RecordedPlot:
             return []
         step_s = (part["time_s"][-1] - part["time_s"][0]) / MOST_RECORDED_STEPS
         if len(part["time_s"]) > 2 * MOST_RECORDED_STEPS:
-            part = thinned(part, step_s)
+            part = thin_columns(part, step_s)
         lines = [np.round(self._unit.per_si * part[name], 4) for name in COLUMNS]
         rows: list[list[float]] = np.column_stack([np.round(part["time_s"] - time_s[-1], 5), *lines]).tolist()
         return rows

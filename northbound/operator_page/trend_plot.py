@@ -14,7 +14,7 @@ from nicegui import ui
 
 from config.codes import State
 from config.recording import Column
-from northbound.observer.trends import WAITING, bands, thinned
+from northbound.observer.trends import WAITING, bands, thin_columns
 from northbound.observer.valve_view import ValveView
 from northbound.operator_page.marks import DASHES
 from webpage.theme import Theme
@@ -100,7 +100,7 @@ class TrendPlot:
     def _changing(self) -> Options:
         """Return what changes by the reading."""
         now_s = time.monotonic()
-        rows = thinned(self._view.trend(now_s - self._window_s), self._window_s / MOST_STEPS)
+        rows = thin_columns(self._view.trend(now_s - self._window_s), self._window_s / MOST_STEPS)
         wall_ms = 1e3 * (time.time() - now_s)
         begin_ms, end_ms = wall_ms + 1e3 * (now_s - self._window_s), wall_ms + 1e3 * now_s
         lines = self._lines(rows)

@@ -193,7 +193,7 @@ class ValvePanel:
         self._history_source.set_text(happened.source)
         self._history_rows.clear()
         with self._history_rows:
-            for line in facts.happened(happened.lines):
+            for line in facts.list_events(happened.lines):
                 with ui.element("li"):
                     ui.label(line)
 

@@ -3,7 +3,7 @@
 import argparse
 from typing import TYPE_CHECKING
 
-from positioner.cli.parts.daemon_address import add_connection, connected
+from positioner.cli.parts.daemon_address import add_connection, connect_dcs
 
 if TYPE_CHECKING:
     from config.codes import Ne107Cause
@@ -35,7 +35,7 @@ def run(arguments: argparse.Namespace) -> int:
     if arguments.acknowledge not in (None, "all"):
         wanted["acknowledge"] = _cause(arguments.acknowledge)
     for_s = _seconds(arguments.minutes) if "shelve" in wanted else 0.0
-    with connected(arguments) as dcs:
+    with connect_dcs(arguments) as dcs:
         for name, cause in wanted.items():
             written = {"alarm_acknowledge": cause} if name == "acknowledge" else {"alarm_shelve": cause}
             dcs.set_all({**written, **({} if name == "acknowledge" else {"alarm_shelve_time": for_s})})

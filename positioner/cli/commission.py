@@ -42,7 +42,7 @@ def run(arguments: argparse.Namespace) -> int:
     """Commission, print, ask, write; 0 if it came to a file, else 1."""
     import sys
 
-    from positioner.cli.parts.breaking_off import ended_as_by_ctrl_c
+    from positioner.cli.parts.breaking_off import end_as_by_ctrl_c
     from positioner.cli.parts.own_valve import own_valve, unknown_travel
     from positioner.cli.parts.valve_test import kept
     from positioner.control.settings import Settings
@@ -56,7 +56,7 @@ def run(arguments: argparse.Namespace) -> int:
         print("nothing was moved")
         return 1
     stranger = unknown_travel(file)
-    with ended_as_by_ctrl_c(), own_valve(stranger, path) as valve:
+    with end_as_by_ctrl_c(), own_valve(stranger, path) as valve:
         bounds = Settings.of(stranger).experiment
         found = commission(valve, file.valve.name, bounds, lambda said: print(f"  {said}", file=sys.stderr, flush=True))
     print(found.outcome.summary())
@@ -78,7 +78,7 @@ def _file(path: Path, name: str | None) -> "DaemonFile":
     from config.daemon_file import DaemonFile, load_daemon
     from config.errors import InputError
     from config.file_kinds import require_kind
-    from config.loading import read_toml, validated
+    from config.loading import read_toml, validate
 
     if not path.exists():
         raise InputError(str(path), NOT_THERE)
@@ -91,7 +91,7 @@ def _file(path: Path, name: str | None) -> "DaemonFile":
         return load_daemon(path, name)
     require_kind(tables | {"valve": valve | {"stroke_m": STROKE_UNKNOWN_M}}, "daemon", str(path))
     whole = {key: table for key, table in tables.items() if key != "law"}
-    return validated(DaemonFile, whole | {"valve": valve | {"stroke_m": STROKE_UNKNOWN_M}}, str(path), path.parent)
+    return validate(DaemonFile, whole | {"valve": valve | {"stroke_m": STROKE_UNKNOWN_M}}, str(path), path.parent)
 
 
 def _write_proposals(

@@ -16,10 +16,10 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
 
 def run(arguments: argparse.Namespace) -> int:
     """Print the words of the shell; 0."""
-    from config.extras import needed
+    from config.extras import import_extra
     from positioner.cli.main import command_parser
 
-    shtab = needed("shtab", "positioner completion")
+    shtab = import_extra("shtab", "positioner completion")
     parser = command_parser()
     _complete_paths(parser, shtab.FILE)
     print(shtab.complete(parser, arguments.shell))

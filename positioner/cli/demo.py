@@ -446,13 +446,13 @@ def _observe(dcs: "Dcs", duration_s: float, label: str) -> float:
     while True:
         now = dcs.get_all("state", "position", "reference_in_force", "command")
         positions.append(now["position"])
-        _show_passing(shown_step(label, now))
+        _show_passing(format_step(label, now))
         if time.monotonic() >= end_s:
             return sum(positions) / len(positions)
         time.sleep(0.02)
 
 
-def shown_step(label: str, now: dict[str, float]) -> str:
+def format_step(label: str, now: dict[str, float]) -> str:
     """Return what a terminal of 80 columns has room for."""
     return f"{label:34} {_bar(now)} S{now['state']:.0f} {now['command'] / 1e3:5.1f} kPa"
 

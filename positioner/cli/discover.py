@@ -32,7 +32,7 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
 
 def run(arguments: argparse.Namespace) -> int:
     """Discover and print; 0 if a form explains the recordings, or nothing is left to explain, else 1."""
-    from config.extras import needed
+    from config.extras import import_extra
     from positioner.cli.parts.model_arguments import read_valve
     from positioner.cli.parts.naming import files_named, naming
     from positioner.cli.parts.progress import at_work
@@ -43,7 +43,7 @@ def run(arguments: argparse.Namespace) -> int:
     for option in ("picture", "json"):
         writable(getattr(arguments, option), f"--{option}")
     if arguments.picture is not None:
-        needed("matplotlib.pyplot", "--picture")
+        import_extra("matplotlib.pyplot", "--picture")
     valve = read_valve(arguments.valve)
     recordings, test = read_fitted(arguments.recordings, arguments, valve)
     named = files_named(arguments.recordings, arguments.test, arguments.valve)

@@ -43,7 +43,7 @@ def run(arguments: argparse.Namespace) -> int:
     """Diagnose, play, print a line a round; 0 if nothing is left to be told apart, else 1."""
     from config.daemon_file import load_daemon
     from config.recording import Recording
-    from positioner.cli.parts.breaking_off import ended_as_by_ctrl_c, told_when_broken_off
+    from positioner.cli.parts.breaking_off import end_as_by_ctrl_c, tell_when_broken_off
     from positioner.cli.parts.experiment_player import player_on, require_ready
     from positioner.cli.parts.model_arguments import read_valve, require_effects
     from positioner.cli.parts.naming import naming
@@ -77,8 +77,8 @@ def run(arguments: argparse.Namespace) -> int:
         print("there is one candidate: nothing was played")
         return 0 if found.verdict in ("adequate", "missing") else 1
     effects = [find_effect(name, "effects") for name in arguments.effects or tried_effects()]
-    broken_off = told_when_broken_off("discriminate", lambda: f"{BROKEN_OFF} {arguments.out}")
-    with broken_off, ended_as_by_ctrl_c(), Progress() as progress:
+    broken_off = tell_when_broken_off("discriminate", lambda: f"{BROKEN_OFF} {arguments.out}")
+    with broken_off, end_as_by_ctrl_c(), Progress() as progress:
         told = discriminate(
             fits,
             [*recordings, test] if test else recordings,

@@ -101,10 +101,10 @@ def _load(files: "Sequence[DaemonFile]") -> str:
 
 def _law(file: "DaemonFile", config: Path) -> str:
     from config.errors import InputError
-    from positioner.cli.parts.extended_valves import extended_valve_of
+    from positioner.cli.parts.extended_valves import load_extended_valve
 
     try:
-        valve = extended_valve_of(file, str(config))
+        valve = load_extended_valve(file, str(config))
     except InputError as error:
         raise FailedCheck(str(error)) from None
     if valve is None:

@@ -47,7 +47,7 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
 def run(arguments: argparse.Namespace) -> int:
     """Examine what was not examined before, write the tables, print the ranking."""
     from config.errors import InputError
-    from config.extras import needed
+    from config.extras import import_extra
     from positioner.cli.parts.output_files import writable
     from workbench.fleet.drill_down import write_diagnosis_reports
     from workbench.fleet.fleet import at, fleet
@@ -58,7 +58,7 @@ def run(arguments: argparse.Namespace) -> int:
     writable(arguments.report, "--report")
     writable(arguments.picture, "--picture")
     if arguments.picture is not None:
-        needed("matplotlib.pyplot", "--picture")
+        import_extra("matplotlib.pyplot", "--picture")
         if arguments.since is None:
             raise InputError("--picture", "draws what changed since a date: give it as --since DATE")
     if arguments.diagnoses < 0:

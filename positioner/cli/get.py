@@ -2,7 +2,7 @@
 
 import argparse
 
-from positioner.cli.parts.daemon_address import add_connection, connected
+from positioner.cli.parts.daemon_address import add_connection, connect_dcs
 
 HELP = "read registers of a running daemon, by name (without a name: all)"
 EXAMPLE = "positioner get position state fault"
@@ -26,7 +26,7 @@ def run(arguments: argparse.Namespace) -> int:
     names = arguments.names or list(BY_NAME)
     for name in names:
         register_named(name)
-    with connected(arguments) as dcs:
+    with connect_dcs(arguments) as dcs:
         values = dcs.get_all(*names)
     if arguments.json:
         print(json.dumps(json_value(values)))

@@ -3,7 +3,7 @@
 import argparse
 from typing import TYPE_CHECKING
 
-from positioner.cli.parts.daemon_address import add_connection, connected
+from positioner.cli.parts.daemon_address import add_connection, connect_dcs
 
 if TYPE_CHECKING:
     from positioner.daemon.health.operation import OperationDay
@@ -35,7 +35,7 @@ def run(arguments: argparse.Namespace) -> int:
     from northbound.observer.words import in_words
 
     days = _days(arguments)
-    with connected(arguments) as dcs:
+    with connect_dcs(arguments) as dcs:
         values = dcs.get_all(*FIGURES)
     if arguments.json:
         print(json.dumps(json_value({**values, "days": [each.model_dump() for each in days]})))

@@ -3,7 +3,7 @@
 import argparse
 from typing import TYPE_CHECKING
 
-from positioner.cli.parts.daemon_address import add_connection, connected
+from positioner.cli.parts.daemon_address import add_connection, connect_dcs
 
 if TYPE_CHECKING:
     from positioner.dcs import Dcs
@@ -35,7 +35,7 @@ def run(arguments: argparse.Namespace) -> int:
         "beta": arguments.beta_pa,
         "omega": arguments.omega_rad_per_s,
     }
-    with connected(arguments) as dcs:
+    with connect_dcs(arguments) as dcs:
         for permissive in identify_permissives(dcs.get_all(*IDENTIFY_READS)):
             if not permissive.holds:
                 raise CommandFailed(permissive.remedy)

@@ -26,7 +26,7 @@ def run(arguments: argparse.Namespace) -> int:
     """Print what the file holds, or what is read of it; 0."""
     from config.errors import InputError
     from config.plausibility import oddities
-    from positioner.cli.parts.breaking_off import told_when_broken_off
+    from positioner.cli.parts.breaking_off import tell_when_broken_off
     from positioner.cli.parts.output_files import recording_writable
     from positioner.cli.parts.progress import Progress
     from workbench.imports.own_format import own_recording
@@ -38,7 +38,7 @@ def run(arguments: argparse.Namespace) -> int:
         recording_writable(arguments.out, "-o")
     if arguments.column:
         progress = Progress()
-        with told_when_broken_off("import", lambda: progress.known):
+        with tell_when_broken_off("import", lambda: progress.known):
             recording = read_mapped(arguments.file, arguments, None, progress)
     else:
         own = own_recording(arguments.file)
@@ -61,13 +61,13 @@ def _inspect(arguments: argparse.Namespace) -> int:
     import shlex
 
     from workbench.imports.export_preview import preview
-    from workbench.imports.import_questions import answered
+    from workbench.imports.import_questions import ask_for_mapping
     from workbench.imports.mapping_file import write_mapping_file
 
     found = preview(arguments.file, arguments.sheet)
     print(f"{arguments.file}: {found.summary()}")
     mapping = arguments.file.with_name(f"{arguments.file.name}.mapping.toml")
-    table = answered(found, _ask).model_copy(update={"sheet": arguments.sheet, "decimal": arguments.decimal})
+    table = ask_for_mapping(found, _ask).model_copy(update={"sheet": arguments.sheet, "decimal": arguments.decimal})
     write_mapping_file(mapping, table)
     print(f"{mapping}: written; all exports like this one are read with it:")
     print(f"positioner import {shlex.quote(str(arguments.file))} --mapping {shlex.quote(str(mapping))} -o rec.csv")

@@ -41,7 +41,7 @@ def main(words: Sequence[str] | None = None) -> int:
 def _run_command(words: Sequence[str] | None) -> int:
     """Run one command, now that what it imports is known to be ours."""
     from config.errors import CommandFailed, InputError
-    from config.extras import told
+    from config.extras import name_missing_extra
     from positioner.cli.parts.output_files import refuse_own_inputs
 
     _escape_what_cannot_be_shown()
@@ -60,7 +60,7 @@ def _run_command(words: Sequence[str] | None) -> int:
         print(f"{who}: {error}", file=sys.stderr)
         return 1
     except ModuleNotFoundError as error:
-        if said := told(f"{who}:", error):
+        if said := name_missing_extra(f"{who}:", error):
             print(said, file=sys.stderr)
             return 2
         raise

@@ -79,7 +79,7 @@ def run(arguments: argparse.Namespace) -> int:
     from config.recording import write_recording
     from config.valve_file import find_valve
     from positioner.cli.parts.csv_series import read_series
-    from positioner.cli.parts.extended_valves import extended_valve_of
+    from positioner.cli.parts.extended_valves import load_extended_valve
     from positioner.cli.parts.model_arguments import read_valve
     from positioner.cli.parts.output_files import recording_writable
     from positioner.cli.parts.progress import at_work
@@ -89,10 +89,10 @@ def run(arguments: argparse.Namespace) -> int:
     valve = read_valve(arguments.valve).valve
     time_s, reference_m = read_series(arguments.reference, "reference_m")
     _require_travel(arguments.reference, reference_m, valve.stroke_m)
-    extended = None if arguments.extended is None else extended_valve_of(_files(arguments, valve)[0], "--extended")
+    extended = None if arguments.extended is None else load_extended_valve(_files(arguments, valve)[0], "--extended")
     what = f"identifying {valve.name} and following {time_s[-1] - time_s[0]:g} s of references"
     with at_work("play", what):
-        runs = [_played(arguments, path, valve, time_s, reference_m, None)]
+        runs = [_play_daemon(arguments, path, valve, time_s, reference_m, None)]
     applied = runs[0].snapshots[-1].decision.applied
     ratios = applied.ratios
     if ratios is None:
@@ -101,7 +101,7 @@ def run(arguments: argparse.Namespace) -> int:
     print(_left(runs[0], valve.stroke_m, f"law {arguments.law}, identified"))
     if extended is not None:
         with at_work("play", f"the same, given {arguments.extended}"):
-            runs.append(_played(arguments, path, valve, time_s, reference_m, extended))
+            runs.append(_play_daemon(arguments, path, valve, time_s, reference_m, extended))
         print(_left(runs[1], valve.stroke_m, f"law {arguments.law}, given {arguments.extended}"))
     last = runs[-1]
     write_recording(arguments.out, _recording(last.snapshots, float(time_s[0]) - last.begin_s, valve.name))
@@ -121,7 +121,7 @@ def _travel_m(places_m: list[float]) -> float:
     return sum(abs(after - before) for before, after in pairwise(places_m))
 
 
-def _played(
+def _play_daemon(
     arguments: argparse.Namespace,
     path: Path,
     valve: "ValveParameters",
@@ -162,7 +162,7 @@ def _require_travel(path: Path, reference_m: "Column", stroke_m: float) -> None:
 def _files(arguments: argparse.Namespace, valve: "ValveParameters") -> tuple["DaemonFile", "SlaveFile"]:
     """Return the files that a daemon and a slave would be given for this loop."""
     from config.daemon_file import DaemonFile
-    from config.loading import validated
+    from config.loading import validate
     from config.slave_file import SlaveFile
 
     most_pa = max(420e3, 1.5 * (valve.static_n + valve.spring_n_per_m * valve.stroke_m) / valve.diaphragm_area_m2)
@@ -179,8 +179,8 @@ def _files(arguments: argparse.Namespace, valve: "ValveParameters") -> tuple["Da
         "supply": {"maximum_pa": most_pa},
     }
     return (
-        validated(DaemonFile, daemon, "--period-s"),
-        validated(SlaveFile, slave, "--period-s, --noise-m, --seed"),
+        validate(DaemonFile, daemon, "--period-s"),
+        validate(SlaveFile, slave, "--period-s, --noise-m, --seed"),
     )
 
 

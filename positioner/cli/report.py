@@ -42,7 +42,7 @@ def run(arguments: argparse.Namespace) -> int:
     kept = records(folder)
     if not any(each.kind for each in kept):
         raise CommandFailed(f"nothing is kept in {folder}: a test with --keep as_found or as_left keeps it")
-    report = ValveReport(file.valve.name, kept, _recommended(arguments.recommended, kept), recommended_by(file))
+    report = ValveReport(file.valve.name, kept, _read_recommended(arguments.recommended, kept), recommended_by(file))
     if arguments.out.suffix.lower() == ".pdf":
         try:
             write_pdf(report, arguments.out)
@@ -54,7 +54,7 @@ def run(arguments: argparse.Namespace) -> int:
     return 0
 
 
-def _recommended(words: Sequence[str], kept: "Sequence[object]") -> dict[str, float]:
+def _read_recommended(words: Sequence[str], kept: "Sequence[object]") -> dict[str, float]:
     """Return figures by name.
 
     Raises:

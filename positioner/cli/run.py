@@ -22,7 +22,7 @@ def run(arguments: argparse.Namespace) -> int:
     # Before the daemon is loaded, which takes longer: most mistakes are in a file.
     path = config_file(arguments)
     files = load_valves(path)
-    from positioner.cli.parts.extended_valves import extended_valve_of
+    from positioner.cli.parts.extended_valves import load_extended_valve
     from positioner.daemon.service import serve
 
-    return serve(files, path, [extended_valve_of(file, str(path)) for file in files])
+    return serve(files, path, [load_extended_valve(file, str(path)) for file in files])

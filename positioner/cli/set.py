@@ -2,7 +2,7 @@
 
 import argparse
 
-from positioner.cli.parts.daemon_address import add_connection, connected
+from positioner.cli.parts.daemon_address import add_connection, connect_dcs
 
 HELP = "write a register of a running daemon"
 EXAMPLE = "positioner set reference 0.5"
@@ -18,7 +18,7 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
 def run(arguments: argparse.Namespace) -> int:
     """Write it."""
     value = _number(arguments.name, arguments.value)
-    with connected(arguments) as dcs:
+    with connect_dcs(arguments) as dcs:
         dcs.set(arguments.name, value)
     return 0
 

@@ -49,7 +49,7 @@ def run(arguments: argparse.Namespace) -> int:
     if arguments.of is not None:
         if given := [key for key, value in sheet.items() if value is not None]:
             raise InputError(_option(given[0]), "is of a data sheet, so --of must not be given")
-        return _changed(arguments)
+        return _change_file(arguments)
     if missing := [key for key in REQUIRED if sheet[key] is None]:
         raise InputError(_option(missing[0]), "is needed of a data sheet; --of VALVE.toml changes another valve")
     if arguments.set or arguments.without:
@@ -65,13 +65,13 @@ def _option(key: str) -> str:
     return f"--{key.replace('_', '-')}"
 
 
-def _changed(arguments: argparse.Namespace) -> int:
-    from config.valve_changes import changed_valve
+def _change_file(arguments: argparse.Namespace) -> int:
+    from config.valve_changes import change_valve
     from config.writing import write_valve
     from positioner.cli.parts.model_arguments import read_valve, require_parameters
 
-    values = dict(map(_assigned, arguments.set))
-    file = changed_valve(read_valve(arguments.of), values, arguments.without)
+    values = dict(map(_read_assignment, arguments.set))
+    file = change_valve(read_valve(arguments.of), values, arguments.without)
     require_parameters(file, "--set")
     said = [f"{name} = {value:g}" for name, value in values.items()] + [f"without {each}" for each in arguments.without]
     write_valve(arguments.out, file, [f"{arguments.of} with {each}" for each in said])
@@ -79,7 +79,7 @@ def _changed(arguments: argparse.Namespace) -> int:
     return 0
 
 
-def _assigned(text: str) -> tuple[str, float]:
+def _read_assignment(text: str) -> tuple[str, float]:
     """Return name and value.
 
     Raises:

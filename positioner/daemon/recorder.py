@@ -25,7 +25,7 @@ from config.drive import COLUMNS as OF_KIND
 from config.drive import VALVE, Kind
 from config.errors import InputError
 from config.file_stem import file_stem
-from config.recorder_files import COLUMNS, compressed_already, files_of_stem, number_of
+from config.recorder_files import COLUMNS, files_of_stem, find_compressed_twins, number_of
 from positioner.daemon.logs import log_event
 from positioner.daemon.recording_compression import Compression, half_done
 
@@ -204,7 +204,7 @@ class Recorder:
             except OSError as error:
                 log_event(log, logging.WARNING, "old recording stays", file=str(old), reason=error.strerror)
         if self._compression is not None:
-            for path in compressed_already(self._folder, self._stem):
+            for path in find_compressed_twins(self._folder, self._stem):
                 path.unlink(missing_ok=True)
             self._compression.begin(
                 [each for each in files_of_stem(self._folder, self._stem)[:-2] if each.suffix == ".csv"]

@@ -16,7 +16,7 @@ from pathlib import Path
 from typing import Any
 
 from config.errors import InputError
-from config.lock_file import locked
+from config.lock_file import take_lock
 from positioner.history.entries import TABLES, Entry, Event, Setting
 
 FILE_NAME = "history.sqlite"
@@ -64,13 +64,13 @@ class HistoryFile:
         self._lock: int | None = None
         if beside_another:
             try:
-                self._connection = _connected(self.path)
+                self._connection = _connect(self.path)
             except sqlite3.Error as error:
                 raise InputError(str(self.path), f"the history cannot be kept there: {error}") from None
             return
         try:
             folder.mkdir(parents=True, exist_ok=True)
-            self._lock = locked(folder / f"{FILE_NAME}.lock", "another daemon keeps its history there")
+            self._lock = take_lock(folder / f"{FILE_NAME}.lock", "another daemon keeps its history there")
         except OSError as error:
             raise InputError(str(folder), f"the history cannot be kept there: {error.strerror}") from None
         try:
@@ -158,7 +158,7 @@ class HistoryFile:
         try:
             if not self.path.exists():
                 _make(self.path)
-            return _connected(self.path)
+            return _connect(self.path)
         except sqlite3.OperationalError as error:
             raise InputError(str(self.path), f"the history cannot be kept there: {error}") from None
         except sqlite3.DatabaseError as error:
@@ -227,7 +227,7 @@ def require_tables(connection: sqlite3.Connection, path: Path) -> None:
         raise InputError(str(path), f"has other tables than a history of version {VERSION} has; move it away")
 
 
-def _connected(path: Path) -> sqlite3.Connection:
+def _connect(path: Path) -> sqlite3.Connection:
     """Open the file to write.
 
     Raises:

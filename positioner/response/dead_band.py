@@ -12,7 +12,7 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 from statistics import median
 
-from positioner.response.figure import Figure, undetermined
+from positioner.response.figure import Figure, without_value
 from positioner.response.step_figures import StepFigures
 
 RESPONDED = 0.1
@@ -47,7 +47,7 @@ def _bounds(steps: Sequence[StepFigures], gain: float) -> tuple[list[InputBounds
     for step in steps:
         since += step.size
         way = 1 if step.size > 0 else -1
-        if not responded(step, gain):
+        if not follows_step(step, gain):
             reached[way] = max(reached[way], way * since)
             continue
         if direction and way * since > reached[way]:
@@ -56,7 +56,7 @@ def _bounds(steps: Sequence[StepFigures], gain: float) -> tuple[list[InputBounds
     return reversed_, onward
 
 
-def responded(step: StepFigures, gain: float) -> bool:
+def follows_step(step: StepFigures, gain: float) -> bool:
     """Return whether the stem followed a step, the right way and by a tenth at least of what the gain calls for."""
     travel_m = step.travel_m.value
     return step.moved and travel_m is not None and travel_m / (gain * step.size) > RESPONDED
@@ -65,13 +65,13 @@ def responded(step: StepFigures, gain: float) -> bool:
 def _figure(bounds: Sequence[InputBounds], wanted: str, unit: str) -> Figure:
     lacks = "this recording does not hold a series of small steps"
     if not bounds:
-        return undetermined(f"{lacks}: it lacks {wanted}")
+        return without_value(f"{lacks}: it lacks {wanted}")
     determined = [each for each in bounds if each.low > 0]
     if not determined:
-        return undetermined(
+        return without_value(
             f"{lacks}: the smallest tried, {min(each.high for each in bounds):.4g} {unit}, moved the stem"
         )
     low, high = median(each.low for each in determined), median(each.high for each in determined)
     if high - low > COARSE * high:
-        return undetermined(f"{lacks}: {low:.4g} {unit} did not move the stem, {high:.4g} {unit} did")
+        return without_value(f"{lacks}: {low:.4g} {unit} did not move the stem, {high:.4g} {unit} did")
     return Figure((low + high) / 2, (high - low) / 2)

@@ -7,7 +7,7 @@ from typing import TYPE_CHECKING
 
 from config.results.block import Block, Table
 from config.results.result import Result
-from positioner.response.dead_band import responded
+from positioner.response.dead_band import follows_step
 from positioner.response.figure import Figure
 from positioner.response.step_figures import FIGURES, StepFigures
 
@@ -54,7 +54,7 @@ class ResponseFigures(Result):
     def over_steps(self, name: str) -> Summary | None:
         """Return one of `FIGURES` over the steps that the stem responded to; None when no step determines it."""
         gain = self.static_gain.value
-        asked = [each for each in self.steps if gain and responded(each, gain)]
+        asked = [each for each in self.steps if gain and follows_step(each, gain)]
         determined = [figure.value for each in asked if (figure := getattr(each, name)).value is not None]
         return Summary(len(determined), min(determined), median(determined), max(determined)) if determined else None
 
@@ -73,9 +73,9 @@ class ResponseFigures(Result):
         return [
             f"{len(self.steps)} steps of {self.input}{noise}",
             self._table(),
-            _named("static gain", self.static_gain, 1.0, gain_unit),
-            _named("dead band", self.dead_band, scale, unit),
-            _named("resolution", self.resolution, scale, unit),
+            _label_figure("static gain", self.static_gain, 1.0, gain_unit),
+            _label_figure("dead band", self.dead_band, scale, unit),
+            _label_figure("resolution", self.resolution, scale, unit),
             *self._undetermined(),
             *notes,
         ]
@@ -162,7 +162,7 @@ def _cell(figure: Figure, factor: float) -> str:
     return "-" if figure.value is None else f"{factor * figure.value:.4g}"
 
 
-def _named(name: str, figure: Figure, factor: float, unit: str) -> str:
+def _label_figure(name: str, figure: Figure, factor: float, unit: str) -> str:
     if figure.value is None:
         return f"{name:<12} cannot be determined: {figure.reason}"
     return f"{name:<12} {factor * figure.value:.4g} ± {factor * (figure.plus_minus or 0.0):.2g} {unit}"

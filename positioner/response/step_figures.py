@@ -23,7 +23,7 @@ import numpy as np
 
 from config.recording import Column
 from config.results.result import Brief
-from positioner.response.figure import Figure, LevelCrossing, level_crossing, undetermined
+from positioner.response.figure import Figure, LevelCrossing, level_crossing, without_value
 from positioner.response.rest_level import RestLevel, rest_at_the_end
 from positioner.response.step_detection import StepChange
 
@@ -78,14 +78,14 @@ def figures_of(
     before = rest_at_the_end(time_s[step.before : step.first], position_m[step.before : step.first], quantum_m)
     after = rest_at_the_end(time_s[step.first : step.end], position_m[step.first : step.end], quantum_m)
     if before is None or after is None:
-        return _undetermined_step(start_s, step, "too few samples before or after the step")
+        return _step_without_figures(start_s, step, "too few samples before or after the step")
     std_m = hypot(before.level_std_m, after.level_std_m)
     travel_m = after.level_m - before.level_m
     moved = abs(travel_m) > max(OBSERVABLE_SIGMA * std_m, 1.5 * quantum_m)
     error = (
-        Figure(after.level_m - step.to, after.level_std_m) if is_reference else undetermined("the input is a pressure")
+        Figure(after.level_m - step.to, after.level_std_m) if is_reference else without_value("the input is a pressure")
     )
-    timed = _timed(time_s, position_m, step, before, after) if moved else _all(TIMED, "the stem did not move")
+    timed = _measure_times(time_s, position_m, step, before, after) if moved else _all(TIMED, "the stem did not move")
     return StepFigures(
         time_s=start_s,
         input_from=step.from_,
@@ -100,15 +100,15 @@ def figures_of(
     )
 
 
-def _undetermined_step(start_s: float, step: StepChange, reason: str) -> StepFigures:
+def _step_without_figures(start_s: float, step: StepChange, reason: str) -> StepFigures:
     return StepFigures(start_s, step.from_, step.to, False, None, None, **_all(FIGURES, reason))
 
 
 def _all(names: tuple[str, ...], reason: str) -> dict[str, Figure]:
-    return dict.fromkeys(names, undetermined(reason))
+    return dict.fromkeys(names, without_value(reason))
 
 
-def _timed(
+def _measure_times(
     time_s: Column, position_m: Column, step: StepChange, before: RestLevel, after: RestLevel
 ) -> dict[str, Figure]:
     """Return the times and the overshoot."""
@@ -147,12 +147,14 @@ def _reason_untimed(time_s: Column, step: StepChange, before: RestLevel, after: 
 def _time(crossing: LevelCrossing | None, period_s: float, fewest_within: int) -> Figure:
     """Return when a level was passed, or why that is not known; `fewest_within` samples must lie within that time."""
     if crossing is None:
-        return undetermined(f"{TOO_FAR_APART}: the stem was past it at the first")
+        return without_value(f"{TOO_FAR_APART}: the stem was past it at the first")
     early_s, late_s = max(crossing.time_s - crossing.gap_s, 0.0), crossing.time_s + crossing.gap_s
     if crossing.gap_s > GAP_PERIODS * period_s and crossing.plus_minus_s > 0.1 * crossing.time_s:
-        return undetermined(f"a gap of {crossing.gap_s:.3g} s in the samples: between {early_s:.3g} and {late_s:.3g} s")
+        return without_value(
+            f"a gap of {crossing.gap_s:.3g} s in the samples: between {early_s:.3g} and {late_s:.3g} s"
+        )
     if crossing.time_s < fewest_within * period_s:
-        return undetermined(f"{TOO_FAR_APART}, {period_s:.3g} s: T63 and T86 must take {fewest_within} of them")
+        return without_value(f"{TOO_FAR_APART}, {period_s:.3g} s: T63 and T86 must take {fewest_within} of them")
     return Figure(crossing.time_s, crossing.plus_minus_s)
 
 

@@ -37,7 +37,7 @@ def main(line: socket.socket) -> None:
         with suppress(ImportError):  # told by the process that needs it
             importlib.import_module(name)
     living: set[int] = set()
-    while received := _received(line):
+    while received := _receive(line):
         asked, descriptors = received
         if "wait" in asked:
             _say(line, _has_ended(asked["wait"], asked["within_s"], living))
@@ -55,7 +55,7 @@ def main(line: socket.socket) -> None:
     return None
 
 
-def _received(line: socket.socket) -> tuple[dict[str, Any], list[int]] | None:
+def _receive(line: socket.socket) -> tuple[dict[str, Any], list[int]] | None:
     head, descriptors, _, _ = socket.recv_fds(line, LENGTH_BYTES, 3)
     if not head:
         return None

@@ -36,7 +36,7 @@ def valve_slave(request: pytest.FixtureRequest, tmp_path: Path) -> Iterator[Valv
             here = request.path.parent
             (tmp_path / "slave.toml").write_text(site_files.slave_text(given, tmp_path, here), encoding="utf-8")
             stroke_m = site_files.stroke_in(site_files.valve_path(str(given.get("valve", "seed")), here))
-            lockstep = site_files.merged(site_files.LOCKSTEP, given)["clock"].get("mode") == "lockstep"
+            lockstep = site_files.merge_tables(site_files.LOCKSTEP, given)["clock"].get("mode") == "lockstep"
             slave = stack.enter_context(slave_running(tmp_path, stroke_m, lockstep))
         yield slave
 

@@ -31,7 +31,7 @@ def slave_text(given: Tables, folder: Path, seen_from: Path) -> str:
     Raises:
         NotStarted: a valve file that cannot be read.
     """
-    tables = merged(LOCKSTEP, given)
+    tables = merge_tables(LOCKSTEP, given)
     effects = tables.pop("effect", ())
     valve = valve_path(str(tables.get("valve", "seed")), seen_from)
     if effects:
@@ -51,8 +51,8 @@ def daemon_text(given: Tables, stroke_m: float, port: int, lockstep: bool) -> st
     }
     if lockstep:
         at_leisure = {"device": {"reply_timeout_s": LATE_S}, "safety": {"stale_after_s": STALE_S}}
-        tables = merged(merged(tables, at_leisure), {"cycle": {"pace": "device"}})
-    return toml_text(merged(tables, given))
+        tables = merge_tables(merge_tables(tables, at_leisure), {"cycle": {"pace": "device"}})
+    return toml_text(merge_tables(tables, given))
 
 
 def valve_path(text: str, seen_from: Path) -> Path:
@@ -80,12 +80,12 @@ def stroke_in(valve: Path) -> float:
         raise NotStarted(f"{valve}: valve.stroke_m: cannot be read") from None
 
 
-def merged(below: Tables, above: Tables) -> dict[str, Any]:
+def merge_tables(below: Tables, above: Tables) -> dict[str, Any]:
     """Return tables with others laid over them, key by key."""
     return {
         **below,
         **{
-            key: merged(below[key], value)
+            key: merge_tables(below[key], value)
             if isinstance(value, Mapping) and isinstance(below.get(key), Mapping)
             else value
             for key, value in above.items()

@@ -196,9 +196,12 @@ def write_pdf(report: ValveReport, path: "Path") -> None:
     Raises:
         ModuleNotFoundError: matplotlib is not installed (extra `plot`).
     """
-    from config.extras import needed
+    from config.extras import import_extra
 
-    figures, pages = needed("matplotlib.figure", "report"), needed("matplotlib.backends.backend_pdf", "report")
+    figures, pages = (
+        import_extra("matplotlib.figure", "report"),
+        import_extra("matplotlib.backends.backend_pdf", "report"),
+    )
     with pages.PdfPages(path) as pdf:
         _page(figures, pdf, f"Valve {report.valve}: what has changed", "\n".join(report.findings()))
         for test in report.tests():

@@ -25,7 +25,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from config.recording import Column, Recording
-from positioner.response.figure import Figure, undetermined
+from positioner.response.figure import Figure, without_value
 from positioner.tests_on_the_valve.thresholds import THRESHOLDS
 from signals.noise import quantum_m
 
@@ -88,9 +88,9 @@ class Ramps:
         """Return the command at which the stem passes a position in one direction, without lag, Pa."""
         rates, pressures, deviations = self._at(way, position_m)
         if not rates:
-            return undetermined(_no_line(way))
+            return without_value(_no_line(way))
         if max(rates) - min(rates) < THRESHOLDS.same_rate * max(rates):
-            return undetermined("ramps of one rate alone: lag would count as friction")
+            return without_value("ramps of one rate alone: lag would count as friction")
         weights = 1.0 / deviations
         matrix = np.column_stack([np.ones(len(rates)), rates]) * weights[:, None]
         solved = np.linalg.lstsq(matrix, pressures * weights)[0]
@@ -101,7 +101,7 @@ class Ramps:
         """Return the same at the slowest rate that was played, lag and all, Pa."""
         rates, pressures, deviations = self._at(way, position_m)
         if not rates:
-            return undetermined(_no_line(way))
+            return without_value(_no_line(way))
         slow = [n for n, rate in enumerate(rates) if rate < (1.0 + THRESHOLDS.same_rate) * min(rates)]
         weights = 1.0 / deviations[slow] ** 2
         mean = float(np.sum(weights * pressures[slow]) / np.sum(weights))
@@ -110,7 +110,7 @@ class Ramps:
     def slope_pa_per_m(self) -> Figure:
         """Return the spring rate over the area, Pa/m: mean of all lines, which lag does not turn."""
         if not self.lines:
-            return undetermined("no ramp has a line")
+            return without_value("no ramp has a line")
         slopes = np.array([1.0 / each.slope for each in self.lines])
         deviations = np.array([each.slope_std / each.slope**2 for each in self.lines])
         weights = 1.0 / np.maximum(deviations, 1e-12 * np.abs(slopes)) ** 2
@@ -317,7 +317,7 @@ def _at_ends(line: Line, near: tuple[float, float] | None = None) -> tuple[End, 
 def _end(seen: Sequence[End], which: str, digit_m: float) -> Figure:
     told = [(level, scatter, count) for level, scatter, count in seen if level is not None]
     if not told:
-        return undetermined(f"the stem was not seen to lie at {which} end of its travel")
+        return without_value(f"the stem was not seen to lie at {which} end of its travel")
     counts = np.array([count for _, _, count in told], dtype=np.float64)
     levels = np.array([level for level, _, _ in told])
     middle = float(np.sum(counts * levels) / np.sum(counts))

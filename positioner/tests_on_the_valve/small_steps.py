@@ -15,8 +15,8 @@ from statistics import median
 from config.codes import ValveTestVerdict
 from config.errors import InputError
 from config.recording import Column, Recording
-from positioner.response.dead_band import responded
-from positioner.response.figure import Figure, undetermined
+from positioner.response.dead_band import follows_step
+from positioner.response.figure import Figure, without_value
 from positioner.response.response_figures import respond
 from positioner.tests_on_the_valve.outcome import Curve, Outcome, Picture, Quantity
 from positioner.tests_on_the_valve.program import Bounds, Leap, Program, ramped, require_within
@@ -81,7 +81,7 @@ def small_steps(recording: Recording, valve: str, stroke_m: float, slope_pa_per_
     told = {name: recording.columns[name] for name in ("time_s", "position_m")}
     response = respond(Recording(told | {"command_pa": _in_steps(recording.command_pa)}, recording.metadata))
     gain = response.static_gain.value
-    moved = [each for each in response.steps if gain and responded(each, gain)]
+    moved = [each for each in response.steps if gain and follows_step(each, gain)]
     quantities = [
         Quantity("dead_band_pa", "dead band", "Pa", response.dead_band),
         Quantity("resolution_pa", "resolution", "Pa", response.resolution),
@@ -131,11 +131,11 @@ def _time(name: str, text: str, told: list[Figure]) -> Quantity:
     known = [each for each in told if each.value is not None]
     if not known:
         reason = next((each.reason for each in told if each.reason), "no step moved the stem")
-        return Quantity(name, text, "s", undetermined(reason))
+        return Quantity(name, text, "s", without_value(reason))
     middle = median(each.value or 0.0 for each in known)
     return Quantity(name, text, "s", Figure(middle, median(each.plus_minus or 0.0 for each in known)))
 
 
 def _least(told: list[Figure]) -> Figure:
     known = [(abs(each.value), each.plus_minus) for each in told if each.value is not None]
-    return Figure(*min(known)) if known else undetermined("no step moved the stem")
+    return Figure(*min(known)) if known else without_value("no step moved the stem")

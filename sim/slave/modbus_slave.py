@@ -5,7 +5,7 @@ from pathlib import Path
 from config.errors import InputError
 from config.roles import Role
 from config.slave_file import ModbusRtuBus, ModbusTcpBus, SlaveFile, load_slave, valve_path
-from config.valve_file import load_valve, moved_by_air
+from config.valve_file import load_valve, require_air
 from fieldbus.modbus.server import RegisterServer
 from fieldbus.modbus.tls import Guard
 from sim.effect import find_effect
@@ -67,7 +67,7 @@ def device_of(file: SlaveFile, valve_file: Path) -> Device:
     Raises:
         InputError: a fault in the valve file, or the changes contradict each other.
     """
-    described = moved_by_air(load_valve(valve_file), str(valve_file), "the simulated device obeys pressures")
+    described = require_air(load_valve(valve_file), str(valve_file), "the simulated device obeys pressures")
     if any(find_effect(each.name, str(valve_file)).by_setpoint for each in described.effect):
         raise InputError(str(valve_file), "has a positioner: the simulated device obeys pressures, not set points")
     valve = Valve.from_file(described, step_s=min(VALVE_STEP_S, file.clock.period_s), source=str(valve_file))

@@ -11,7 +11,7 @@ import pytest
 
 from config.recording import Recording, write_recording
 from positioner.cli.main import main
-from positioner.cli.parts.breaking_off import ended_as_by_ctrl_c
+from positioner.cli.parts.breaking_off import end_as_by_ctrl_c
 
 
 def test_a_discovery_that_is_broken_off_says_how_far_it_came(
@@ -70,7 +70,7 @@ def test_who_plays_on_a_valve_is_ended_as_by_ctrl_c_which_vetoes(
 def test_under_nohup_a_terminal_that_is_gone_ends_nothing() -> None:
     before = signal.signal(signal.SIGHUP, signal.SIG_IGN)
     try:
-        with ended_as_by_ctrl_c():
+        with end_as_by_ctrl_c():
             os.kill(os.getpid(), signal.SIGHUP)
     finally:
         signal.signal(signal.SIGHUP, before)

@@ -31,6 +31,6 @@ class Identified:
 def test_who_keeps_a_memory_is_not_told_to_type_a_law_in_which_would_set_it_aside(
     tmp_path: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
 ) -> None:
-    monkeypatch.setattr("positioner.cli.identify.connected", lambda _: Identified())
+    monkeypatch.setattr("positioner.cli.identify.connect_dcs", lambda _: Identified())
     assert main(["identify"]) == 0
     assert "without it, copy:\n[law]" in capsys.readouterr().out

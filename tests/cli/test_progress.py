@@ -7,7 +7,7 @@ import threading
 
 import pytest
 
-from positioner.cli.demo import shown_step
+from positioner.cli.demo import format_step
 from positioner.cli.parts.passing_line import passing
 from positioner.cli.parts.progress import SELDOM_S, Progress
 
@@ -53,12 +53,12 @@ def test_what_the_demo_shows_of_a_step_has_room_in_eighty_columns() -> None:
 
 def test_a_stem_that_nobody_measures_is_shown_as_none() -> None:
     now = {"position": math.nan, "reference_in_force": math.nan, "state": 0.0, "command": 0.0}
-    assert shown_step("S0", now).endswith(f"[{'.' * 20}] nan S0   0.0 kPa")
+    assert format_step("S0", now).endswith(f"[{'.' * 20}] nan S0   0.0 kPa")
 
 
 def step_shown() -> str:
     now = {"position": -1e-9, "reference_in_force": 1.0, "state": 3.0, "command": 1e5}
-    return shown_step("identified anew: step to 0.65 p.u.", now)
+    return format_step("identified anew: step to 0.65 p.u.", now)
 
 
 def test_a_log_has_few_lines() -> None:

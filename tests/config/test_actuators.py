@@ -8,7 +8,7 @@ from config.actuators import NEEDED
 from config.errors import InputError
 from config.valve_file import load_valve, shipped_valve
 from positioner.cli.main import main
-from workbench.page.desk import named_valve
+from workbench.page.desk import name_valve
 
 SITE = '[valve]\nstroke_m = 0.04\nactuator = "{}"\n'
 SLAVE = 'valve = "ordinary"\nactuator = "{}"\n'
@@ -34,7 +34,7 @@ def test_a_plants_file(
 def test_a_valve_file_wherever_it_is_read_the_workbenchs_page_too(actuator: str, tmp_path: Path) -> None:
     path = tmp_path / "v.toml"
     path.write_text(ORDINARY.replace("[valve]", f'[valve]\nactuator = "{actuator}"', 1))
-    for read in (load_valve, lambda each: named_valve(str(each))):
+    for read in (load_valve, lambda each: name_valve(str(each))):
         with pytest.raises(InputError, match=r"valve\.actuator: is neither simulated nor positioned: ") as refused:
             read(path)
         assert NEEDED[actuator] in str(refused.value)

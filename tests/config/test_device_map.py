@@ -8,14 +8,14 @@ from pydantic import ValidationError
 from config.daemon_file import DaemonFile
 from config.device import ModbusTcpDevice
 from config.errors import InputError
-from config.loading import validated
+from config.loading import validate
 from config.modbus_map import SIMULATED_MAP, ModbusMap, Place, StatusBits, without_holes
 from config.quantities import QUANTITIES, WRITABLE, DeviceStatus
 
 
 def refusal(tables: dict[str, Any]) -> str:
     with pytest.raises(InputError) as caught:
-        validated(ModbusTcpDevice, tables, "daemon.toml")
+        validate(ModbusTcpDevice, tables, "daemon.toml")
     assert "\n" not in str(caught.value)
     return str(caught.value)
 

@@ -3,7 +3,7 @@
 import pytest
 
 from config.errors import InputError
-from config.valve_changes import changed_valve
+from config.valve_changes import change_valve
 from config.valve_file import EffectTable, load_valve, shipped_valve
 
 SEED = load_valve(shipped_valve("seed"))
@@ -18,10 +18,10 @@ TWO = SEED.model_copy(
 
 
 def test_what_is_named_has_the_new_value_and_nothing_else_has() -> None:
-    found = changed_valve(TWO, {"coulomb_n": 1300.25, "tight.excess_n": 7.0}, ["preload"])
+    found = change_valve(TWO, {"coulomb_n": 1300.25, "tight.excess_n": 7.0}, ["preload"])
     assert found.valve == SEED.valve.model_copy(update={"coulomb_n": 1300.25})
     assert [(each.name, each.parameters) for each in found.effect] == [("/somewhere/tight.py", {"excess_n": 7.0})]
-    assert changed_valve(TWO, {}) == TWO
+    assert change_valve(TWO, {}) == TWO
 
 
 @pytest.mark.parametrize(
@@ -35,4 +35,4 @@ def test_what_is_named_has_the_new_value_and_nothing_else_has() -> None:
 )
 def test_what_is_not_there_is_said(values: dict[str, float], without: list[str], said: str) -> None:
     with pytest.raises(InputError, match=said):
-        changed_valve(TWO, values, without)
+        change_valve(TWO, values, without)

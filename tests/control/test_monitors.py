@@ -7,7 +7,7 @@ import pytest
 from config.codes import Fault, Mode, Quality, State
 from config.daemon_file import DaemonFile
 from config.errors import InputError
-from config.loading import validated
+from config.loading import validate
 from config.quantities import DeviceStatus
 from positioner.control.controller_memory import Decision
 from positioner.control.monitors import UNKNOWN_S
@@ -136,7 +136,7 @@ def test_a_stem_whose_pressure_stays_away_is_not_frozen(off_pa: float, found: bo
 def test_a_share_of_the_span_is_refused_by_name_of_its_key(threshold: float) -> None:
     table = {"valve": {"stroke_m": 0.1}, "supervision": {"frozen_sensor": {"threshold": threshold}}}
     with pytest.raises(InputError, match=r"supervision\.frozen_sensor\.threshold.*0 \(not watched\) and 1 upward"):
-        validated(DaemonFile, table, "d.toml")
+        validate(DaemonFile, table, "d.toml")
 
 
 def test_a_lost_reply_is_no_jump() -> None:
@@ -178,7 +178,7 @@ def test_by_default_a_sensor_that_stands_still_is_a_fault_and_a_slow_cycle_an_al
 )
 def test_a_safe_pressure_that_is_none_is_one_line(safety: dict[str, object], said: str) -> None:
     with pytest.raises(InputError, match=said):
-        validated(
+        validate(
             DaemonFile,
             {"valve": {"stroke_m": STROKE_M}, "law": LAW, "safety": safety},
             "daemon.toml",
@@ -276,7 +276,7 @@ def test_a_bad_sensor_and_a_silent_dcs_may_be_met_by_hand(table: str) -> None:
 
 def test_a_device_that_does_not_answer_cannot_be_met_by_hand() -> None:
     with pytest.raises(InputError, match=r"supervision\.sample_age\.action"):
-        validated(
+        validate(
             DaemonFile,
             {"valve": {"stroke_m": 0.1}, "supervision": {"sample_age": {"action": "manual"}}},
             "d.toml",

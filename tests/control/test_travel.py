@@ -9,7 +9,7 @@ import pytest
 from config.codes import Mode, Refusal
 from config.daemon_file import DaemonFile
 from config.errors import InputError
-from config.loading import validated
+from config.loading import validate
 from config.slave_file import SlaveFile
 from config.travel_table import TravelTable
 from config.valve_file import shipped_valve
@@ -180,7 +180,7 @@ def test_an_adapting_dead_band_is_three_deviations_or_half_a_jump_of_a_law_that_
 )
 def test_what_cannot_be_is_one_line(travel: dict[str, object], said: str) -> None:
     with pytest.raises(InputError) as refused:
-        validated(DaemonFile, {"valve": {"stroke_m": 0.1}, "travel": travel}, "site.toml")
+        validate(DaemonFile, {"valve": {"stroke_m": 0.1}, "travel": travel}, "site.toml")
     assert str(refused.value).startswith(f"site.toml: {said}")
     assert "\n" not in str(refused.value)
 

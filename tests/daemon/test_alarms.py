@@ -16,7 +16,7 @@ from config.alarm_table import CLASSED, AlarmsTable
 from config.codes import AlarmState, EventKind, ExperimentState, Mode, Ne107Cause, Ne107Status, ValveTestVerdict
 from config.daemon_file import DaemonFile, HealthTable
 from config.errors import InputError
-from config.loading import validated
+from config.loading import validate
 from fieldbus.modbus.register_answers import RegisterError
 from fieldbus.modbus.server import RegisterServer
 from positioner.cli.main import main
@@ -260,7 +260,7 @@ def test_each_alarm_has_advice_and_a_class_that_the_file_may_change() -> None:
     settings = HealthSettings.of(HealthTable(), 0.1, alarms=AlarmsTable.model_validate({"ne107": {"stuck": "F"}}))
     assert settings.cause_classes == {Ne107Cause.STUCK: Ne107Status.FAILURE}
     with pytest.raises(InputError, match=r"^site\.toml: alarms\.ne107: fault: unknown cause; allowed here: "):
-        validated(DaemonFile, {"valve": {"stroke_m": 0.1}, "alarms": {"ne107": {"fault": "M"}}}, "site.toml")
+        validate(DaemonFile, {"valve": {"stroke_m": 0.1}, "alarms": {"ne107": {"fault": "M"}}}, "site.toml")
 
 
 def test_evidence_never_overflows() -> None:

@@ -15,7 +15,7 @@ import pytest
 from config.bus_plugins import DEVICES, DRIVERS
 from config.device import Device
 from config.errors import InputError
-from config.offered import offered
+from config.offered import find_offers
 from drivers import driver_for
 
 GUIDE = Path(__file__).parents[2] / "docs" / "drivers.md"
@@ -140,7 +140,7 @@ def test_two_packages_with_the_same_bus_are_refused(tmp_path: Path, monkeypatch:
     install(tmp_path, {DRIVERS: {"modbus": "other_driver:OtherDriver"}}, "other-positioner")
     monkeypatch.syspath_prepend(tmp_path)
     with pytest.raises(InputError, match="bus 'modbus' is offered by package"):
-        offered(DRIVERS, "bus")
+        find_offers(DRIVERS, "bus")
 
 
 def test_a_schema_without_a_driver_is_one_line() -> None:
@@ -149,7 +149,7 @@ def test_a_schema_without_a_driver_is_one_line() -> None:
 
 
 def test_every_shipped_bus_has_both() -> None:
-    assert offered(DEVICES, "bus").keys() == offered(DRIVERS, "bus").keys() >= {"modbus", "rtu", "canopen"}
+    assert find_offers(DEVICES, "bus").keys() == find_offers(DRIVERS, "bus").keys() >= {"modbus", "rtu", "canopen"}
 
 
 def test_the_guide_needs_nothing_but_the_library() -> None:

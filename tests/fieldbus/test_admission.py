@@ -7,7 +7,7 @@ import pytest
 
 from config.daemon_file import DaemonFile
 from config.errors import InputError
-from config.loading import validated
+from config.loading import validate
 from fieldbus.modbus.admission import (
     BURST_S,
     HANDSHAKES_PER_HOST,
@@ -51,11 +51,11 @@ def test_who_calls_from_elsewhere_than_allowed_gets_neither_a_place_nor_a_handsh
 
 def test_the_file_names_addresses_and_networks_and_nothing_else() -> None:
     table = {"valve": {"stroke_m": 0.1}, "supervisory": {"allowed_networks": ["10.0.0.5", "10.1.0.0/16"]}}
-    allowed = validated(DaemonFile, table, "d.toml").supervisory.allowed_networks
+    allowed = validate(DaemonFile, table, "d.toml").supervisory.allowed_networks
     assert ServerLimits(allowed_networks=allowed).allow("10.1.2.3")
     assert not ServerLimits(allowed_networks=allowed).allow("10.0.0.6")
     with pytest.raises(InputError, match="allowed_networks"):
-        validated(DaemonFile, table | {"supervisory": {"allowed_networks": ["dcs.plant"]}}, "d.toml")
+        validate(DaemonFile, table | {"supervisory": {"allowed_networks": ["dcs.plant"]}}, "d.toml")
 
 
 def test_when_all_are_taken_the_one_unused_for_longest_gives_way_if_for_long_enough() -> None:

@@ -13,7 +13,7 @@ from dcf.parse import parse_file
 
 from config.canopen_device import SHIPPED_EDS, SIMULATED_OBJECTS, CanopenDevice
 from config.errors import InputError
-from config.loading import validated
+from config.loading import validate
 from config.modbus_map import SIMULATED_MAP
 from config.quantities import QUANTITIES, WRITABLE
 from fieldbus.canopen.eds import DATA_TYPE, eds_text, read_eds
@@ -113,7 +113,7 @@ def test_first_fit_never_exceeds_a_pdo_and_keeps_everything() -> None:
 )
 def test_a_device_table_that_cannot_work_is_refused(table: dict[str, object], said: str) -> None:
     with pytest.raises(InputError) as caught:
-        validated(CanopenDevice, table, "daemon.toml")
+        validate(CanopenDevice, table, "daemon.toml")
     assert said in str(caught.value)
 
 

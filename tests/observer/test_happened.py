@@ -3,7 +3,7 @@
 from pathlib import Path
 
 from config.codes import EventKind, Fault, Mode, Ne107Status
-from northbound.observer.happened import AS_SERVED, FROM_HISTORY, SeenEvent, _put_in_words, served_event, what_happened
+from northbound.observer.happened import AS_SERVED, FROM_HISTORY, SeenEvent, _put_in_words, read_event, what_happened
 from northbound.observer.valve_view import ValveView
 from positioner.history import HistoryFile
 from positioner.history.entries import Event
@@ -55,7 +55,7 @@ def test_each_thing_is_told_once_the_connection_as_seen(tmp_path: Path) -> None:
 
 def test_what_its_class_is_is_told_with_its_cause_and_once() -> None:
     values = {"event_number": 4.0, "event_time": 1e9, "event": float(EventKind.EXCITATION_ENDED)}
-    ended = served_event("FV-101", values | {"event_class": 0.0, "event_cause": 0.0})
+    ended = read_event("FV-101", values | {"event_class": 0.0, "event_cause": 0.0})
     assert ended is not None
     assert told(None, ended) == [("the excitation has ended", "")]
     health = Event("FV-101", 5, 1e9, EventKind.HEALTH, "HEALTH", Ne107Status.FUNCTION_CHECK, 1, "not automatic")
@@ -70,10 +70,10 @@ def test_events_that_came_between_two_readings_are_counted() -> None:
 
 
 def test_an_event_over_the_bus_is_the_one_of_the_history() -> None:
-    assert served_event("FV-101", SERVED) == MODE
-    assert served_event("FV-101", SERVED | {"event_number": 0.0}) is None
-    assert served_event("FV-101", {}) is None
-    strange = served_event("FV-101", SERVED | {"event": 99.0})
+    assert read_event("FV-101", SERVED) == MODE
+    assert read_event("FV-101", SERVED | {"event_number": 0.0}) is None
+    assert read_event("FV-101", {}) is None
+    strange = read_event("FV-101", SERVED | {"event": 99.0})
     assert strange is not None
     assert strange.words == "event 99"
 

@@ -7,7 +7,7 @@ import numpy as np
 import pytest
 
 from config.recorder_files import COLUMNS
-from northbound.observer.last_moves import last_moves, recorded_tail
+from northbound.observer.last_moves import last_moves, read_tail
 from northbound.observer.valve_view import ValveView
 from positioner.daemon.recorder import Recorder
 
@@ -41,17 +41,17 @@ def test_a_torn_line_and_a_folder_of_others_are_no_error(tmp_path: Path) -> None
     (file,) = tmp_path.glob("*.csv")
     with file.open("a") as opened:
         opened.write("1.0,24000.0,0.0")
-    tail = recorded_tail(tmp_path, "FV-101", 10.0, time.time())
+    tail = read_tail(tmp_path, "FV-101", 10.0, time.time())
     assert tail is not None
     assert (len(tail), tuple(tail.columns)) == (RATE_HZ, COLUMNS)
-    assert recorded_tail(tmp_path, "FV-102", 10.0, time.time()) is None
-    assert recorded_tail(tmp_path / "nowhere", "FV-101", 10.0, time.time()) is None
+    assert read_tail(tmp_path, "FV-102", 10.0, time.time()) is None
+    assert read_tail(tmp_path / "nowhere", "FV-101", 10.0, time.time()) is None
 
 
 def test_a_recording_that_is_not_written_any_more_is_not_of_the_last_minutes(tmp_path: Path) -> None:
     recorded(tmp_path, 1.0)
-    assert recorded_tail(tmp_path, "FV-101", 10.0, time.time() + 5.0) is not None
-    assert recorded_tail(tmp_path, "FV-101", 10.0, time.time() + 15.0) is None
+    assert read_tail(tmp_path, "FV-101", 10.0, time.time() + 5.0) is not None
+    assert read_tail(tmp_path, "FV-101", 10.0, time.time() + 15.0) is None
 
 
 def test_without_a_recording_what_was_polled_takes_its_place() -> None:

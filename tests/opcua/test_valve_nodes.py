@@ -17,8 +17,8 @@ from northbound.opcua.valve_nodes import (
     STATES,
     Shown,
     Why,
-    refused,
-    shown,
+    show_picture,
+    show_refusals,
 )
 
 VALUES = {each.name: 1.0 for each in REGISTERS} | {"position": 0.4, "reference": 0.5, "friction_baseline": math.nan}
@@ -32,7 +32,7 @@ def picture(freshness: Freshness = NOW, **values: float) -> ValvePicture:
 
 
 def by_node(seen: ValvePicture) -> dict[str, Shown]:
-    found = list(shown(seen)) + list(refused(seen))
+    found = list(show_picture(seen)) + list(show_refusals(seen))
     nodes = {each.node: each for each in found}
     assert len(nodes) == len(found), "a node twice"
     return nodes

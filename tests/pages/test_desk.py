@@ -19,11 +19,11 @@ from tests.pages.laid_out import hidden
 from workbench.diagnosis.extension import extend
 from workbench.imports.export_preview import preview
 from workbench.page import desk as desk_module
-from workbench.page.background import Limits, News, Raced, Work, diagnosed
+from workbench.page.background import Limits, News, Raced, Work, run_diagnosis
 from workbench.page.command_lines import command_lines
-from workbench.page.desk import SAVED, Desk, named_valve
+from workbench.page.desk import SAVED, Desk, name_valve
 from workbench.page.notebook import notebook
-from workbench.page.opening import ColumnChoice, Export, Opened, mapped, opened_like, wrong_with
+from workbench.page.opening import ColumnChoice, Export, Opened, map_export, open_file_like, wrong_with
 from workbench.page.provenance import NamedValve
 from workbench.page.search import Search
 from workbench.page.search_panel import SearchPanel
@@ -95,10 +95,10 @@ def test_a_recording_that_cannot_be_held_out_is_refused_and_nothing_changes(desk
 def test_an_export_is_held_out_as_the_first_was_read(tmp_path: Path) -> None:
     (tmp_path / "b.csv").write_text("t;PV;OUT\n" + "".join(f"{i / 100};{i};{100 * i}\n" for i in range(500)))
     choice = ColumnChoice({"time_s": "t:s", "position_m": "PV:mm", "command_pa": "OUT:Pa"})
-    found = opened_like(tmp_path / "b.csv", "b.csv", replace(first(), choice=choice))
+    found = open_file_like(tmp_path / "b.csv", "b.csv", replace(first(), choice=choice))
     assert found.recording.columns["position_m"][100] == pytest.approx(0.1)
     with pytest.raises(InputError, match="their columns differ"):
-        opened_like(tmp_path / "b.csv", "b.csv", first())
+        open_file_like(tmp_path / "b.csv", "b.csv", first())
 
 
 def test_a_kept_curve_stays_when_the_valve_gets_better_and_goes_with_another_recording(desk: Desk) -> None:
@@ -143,7 +143,7 @@ def test_a_form_that_was_discovered_goes_home_as_a_file_and_as_the_command_that_
 def test_a_time_that_is_over_at_once_says_that_nothing_is_known() -> None:
     told: list[News] = []
     with pytest.raises(CommandFailed, match="nothing is known"):
-        diagnosed(told.append, hidden().fit, hidden().base, Limits(hidden().test, 0.0), ["backlash"])
+        run_diagnosis(told.append, hidden().fit, hidden().base, Limits(hidden().test, 0.0), ["backlash"])
     assert not any(isinstance(each, Raced) for each in told)
 
 
@@ -176,7 +176,7 @@ def test_the_words_of_a_choice_read_the_file_as_the_page_does(
     shown = {"OUT:bar": 0.5, "OUT:mA": 12.0}.get(choice.columns["command_pa"], 50.0)
     rows = [f"{0.5 * i},{i % 7},{shown + i % 3},Good" for i in range(60)]
     (tmp_path / "a.csv").write_text("\n".join(["t,PV,OUT,Q", *rows]))
-    read = mapped(Export("a.csv", tmp_path / "a.csv", preview(tmp_path / "a.csv"), choice), choice)
+    read = map_export(Export("a.csv", tmp_path / "a.csv", preview(tmp_path / "a.csv"), choice), choice)
     parser = argparse.ArgumentParser()
     add_export_arguments(parser)
     again = read_mapped(tmp_path / "a.csv", parser.parse_args(list(choice.words)), None)
@@ -191,7 +191,7 @@ def test_a_dropped_valve_file_whose_own_effect_stayed_behind_says_so(tmp_path: P
     dropped = tmp_path / "upload-1.toml"
     dropped.write_text(shipped_valve("seed").read_text() + '\n[[effect]]\nname = "./tight_spot.py"\n')
     with pytest.raises(InputError, match=r"^mine\.toml: names tight_spot\.py, an effect of your own"):
-        named_valve(str(dropped), "mine.toml")
+        name_valve(str(dropped), "mine.toml")
 
 
 def test_the_race_and_the_errors_are_in_the_unit_that_was_chosen(desk: Desk) -> None:

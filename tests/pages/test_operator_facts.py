@@ -19,7 +19,7 @@ from config.role_passwords import read_passwords, set_password
 from config.roles import Role
 from northbound.observer.freshness import Freshness
 from northbound.observer.happened import Happened
-from northbound.observer.trends import thinned
+from northbound.observer.trends import thin_columns
 from northbound.observer.valve_view import ValvePicture
 from northbound.observer.waiting_reference import Writer
 from northbound.operator_page import facts
@@ -66,7 +66,7 @@ def test_when_something_has_happened_is_told_with_its_zone(monkeypatch: pytest.M
     monkeypatch.setenv("TZ", "XYZ-3")
     time.tzset()
     try:
-        (line,) = facts.happened([Happened(0.0, "the daemon started")])
+        (line,) = facts.list_events([Happened(0.0, "the daemon started")])
     finally:
         monkeypatch.undo()
         time.tzset()
@@ -190,12 +190,12 @@ def test_a_window_keeps_its_extremes_and_its_gaps() -> None:
     time_s = np.arange(0.0, 600.0, 0.05)
     position_m = np.full(time_s.size, 0.05)
     position_m[7777], position_m[3333], position_m[5000:5003] = 0.09, 0.01, np.nan
-    kept = thinned({"time_s": time_s, "position_m": position_m}, 1.5)
+    kept = thin_columns({"time_s": time_s, "position_m": position_m}, 1.5)
     assert len(kept["time_s"]) <= 3 * 400
     assert (np.nanmax(kept["position_m"]), np.nanmin(kept["position_m"])) == (0.09, 0.01)
     assert np.isnan(kept["position_m"]).any()
     assert (np.diff(kept["time_s"]) > 0).all()
-    assert len(thinned({"time_s": time_s[:0], "position_m": position_m[:0]}, 1.5)["time_s"]) == 0
+    assert len(thin_columns({"time_s": time_s[:0], "position_m": position_m[:0]}, 1.5)["time_s"]) == 0
 
 
 def test_a_role_ends_by_itself() -> None:

@@ -27,7 +27,7 @@ from workbench.page import background
 from workbench.page import desk as desk_module
 from workbench.page.background import Finished, News
 from workbench.page.command_lines import command_lines
-from workbench.page.desk import Desk, named_valve
+from workbench.page.desk import Desk, name_valve
 from workbench.page.notebook import notebook
 from workbench.page.opening import Opened
 from workbench.page.provenance import DataSheetMade, NamedValve
@@ -96,7 +96,7 @@ def desk(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Iterator[Desk]:
     write_valve(tmp_path / "valve.toml", hidden().base)
     desk = Desk(folder=tmp_path / "desk")
     desk.folder.mkdir()
-    desk.take_valve(named_valve("valve.toml"))
+    desk.take_valve(name_valve("valve.toml"))
     desk.take_recording(recording("fit.csv"))
     yield desk
     desk.clear()

@@ -17,7 +17,7 @@ from workbench.blind.hiding import Hidden, hide
 from workbench.data.held_out import joined
 from workbench.diagnosis.diagnosis import diagnose
 from workbench.diagnosis.extension import extend
-from workbench.discriminate.measured_pressure import raced_by_pressure
+from workbench.discriminate.measured_pressure import race_by_pressure
 from workbench.fit.fit_result import Fit
 from workbench.fit.fitting import fit
 
@@ -50,7 +50,7 @@ def fits(bowed: Hidden) -> dict[str, Fit]:
 
 @pytest.mark.long
 def test_rivals_are_raced_by_the_pressure_where_it_was_measured(bowed: Hidden, fits: dict[str, Fit]) -> None:
-    raced = raced_by_pressure(fits, [bowed.fit, bowed.test], LIBRARY, 2)
+    raced = race_by_pressure(fits, [bowed.fit, bowed.test], LIBRARY, 2)
     assert all(each.from_pressure for each in raced.values())
     assert raced["sensor_nonlinearity"].rms_m < 0.7 * fits["sensor_nonlinearity"].rms_m
 
@@ -72,12 +72,12 @@ def worse(recording: Recording) -> Recording:
 
 @pytest.mark.parametrize("made", few_always([without, unmeasured, worse], 2))
 def test_else_by_the_command(bowed: Hidden, fits: dict[str, Fit], made: Callable[[Recording], Recording]) -> None:
-    assert raced_by_pressure(fits, [made(bowed.fit), bowed.test], LIBRARY, 2) is fits
+    assert race_by_pressure(fits, [made(bowed.fit), bowed.test], LIBRARY, 2) is fits
 
 
 def test_nor_where_one_acts_before_it(bowed: Hidden, fits: dict[str, Fit]) -> None:
     rivals = {**fits, "ip_lag": fits["flow_force"]}
-    assert raced_by_pressure(rivals, [bowed.fit, bowed.test], LIBRARY, 2) is rivals
+    assert race_by_pressure(rivals, [bowed.fit, bowed.test], LIBRARY, 2) is rivals
 
 
 @pytest.mark.long

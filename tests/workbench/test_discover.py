@@ -28,7 +28,7 @@ from workbench.discover.curve import curve_of, has_curve
 from workbench.discover.discovery import discover
 from workbench.discover.form_file import form_text, write_forms
 from workbench.discover.grammar import FORMS, Form
-from workbench.discover.proposal import proposed
+from workbench.discover.proposal import propose_forms
 from workbench.fit.fitting import base_fit
 from workbench.fit.problem import problem
 
@@ -140,7 +140,7 @@ def test_projection_puts_a_hidden_form_first_and_landings_miss_its_force(tmp_pat
     others = ("force_constant", "scaled_over_position_bump", *FEW)
     with written_here(tmp_path):
         effects = {path: read_effect(Path(path)) for path in write_forms([named(each) for each in others], tmp_path)}
-        first, *_ = proposed(base, of, effects, workers=1)
+        first, *_ = propose_forms(base, of, effects, workers=1)
     assert Path(first.name).stem == FEW[0]
     assert first.points[0][0] > 0.0, "a spring pushes against opening"
     assert PLACE_M / BARE.valve.stroke_m in [pytest.approx(place, abs=0.1) for _, place in first.points]

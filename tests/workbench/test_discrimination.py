@@ -121,7 +121,7 @@ def test_an_experiment_is_designed_for_the_likeliest(
 ) -> None:
     race = RivalRace({f"ip_lag {i}": fits["ip_lag"] for i in range(ASKED + 1)}, (recording,), 1)
     asked: list[object] = []
-    monkeypatch.setattr(rival_race, "designed", lambda left, *_, **__: asked.extend(left))
+    monkeypatch.setattr(rival_race, "design_experiment", lambda left, *_, **__: asked.extend(left))
     race.experiment(Terms(BOUNDS))
     assert len(race.alive) > ASKED
     assert asked == race.alive[:ASKED]

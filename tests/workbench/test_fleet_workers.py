@@ -53,7 +53,7 @@ def test_a_recording_that_kills_its_workers_is_listed_and_a_scheduler_that_is_go
     assert killed.outcome == "unreadable"
     assert killed.sentence == "the workers that examined it died"
     for status in ("cancelled", "lost", "finished"):
-        with pytest.raises(CommandFailed, match="the same command goes on from there"), engine._told_when_gone():
+        with pytest.raises(CommandFailed, match="the same command goes on from there"), engine._tell_when_gone():
             engine._answer(Future(status), set(), 1.0)
     assert engine._answer(Future("cancelled"), {"examine-1"}, 9.0).sentence == "not examined within 9 s"
 

@@ -21,7 +21,7 @@ from sim.composition import Composition
 from sim.effect import first_effects, shipped_effect, shipped_effects, tried_effects
 from tests.workbench.valves import error_of
 from workbench.blind import trial
-from workbench.blind.hiding import Hidden, drawn_effects, drawn_valve, hide, known_valve, strength
+from workbench.blind.hiding import Hidden, draw_effects, draw_valve, guess_valve, hide, strength
 from workbench.blind.input_signal import FIRST_PASSAGE_SHARE, excitation
 from workbench.blind.sealing import FILES, SEALED, seal
 from workbench.blind.trial import NOISE_M
@@ -287,12 +287,12 @@ def test_an_effect_is_visible_by_what_the_refitted_rest_misses(hidden: Hidden) -
 
 def first_effect(seed: int) -> str:
     stream = np.random.SeedSequence(seed).spawn(2)[1]
-    return drawn_effects(np.random.default_rng(stream), 1)[0].name
+    return draw_effects(np.random.default_rng(stream), 1)[0].name
 
 
 def test_two_effects_differ_and_can_be_told_apart() -> None:
     generator = np.random.default_rng(0)
-    drawn = [drawn_effects(generator, 2) for _ in range(300)]
+    drawn = [draw_effects(generator, 2) for _ in range(300)]
     assert all(len({one.name, other.name}) == 2 for one, other in drawn)
     pairs = {frozenset((one.name, other.name)) for one, other in drawn}
     assert frozenset(("preload", "sensor_offset")) not in pairs
@@ -300,7 +300,7 @@ def test_two_effects_differ_and_can_be_told_apart() -> None:
 
 
 def test_valves_spread_over_their_ranges() -> None:
-    valves = [drawn_valve(np.random.default_rng(seed)) for seed in range(200)]
+    valves = [draw_valve(np.random.default_rng(seed)) for seed in range(200)]
     ranges = {
         "coulomb_n": ([each.coulomb_n for each in valves], 250.0, 1424.0),
         "static over coulomb": ([each.static_n / each.coulomb_n for each in valves], 1.05, 1.35),
@@ -315,7 +315,7 @@ def test_valves_spread_over_their_ranges() -> None:
 @pytest.mark.parametrize("name", shipped_effects())
 def test_strengths_spread_within_the_declared_starts(name: str) -> None:
     effect, generator = shipped_effect(name, "test"), np.random.default_rng(1)
-    known = known_valve(SEED, generator)
+    known = guess_valve(SEED, generator)
     tables = [strength(effect, SEED, known, generator).parameters for _ in range(200)]
     for key, parameter in effect.parameters.items():
         starts = parameter.starts_for(known if parameter.given else SEED)
@@ -336,7 +336,7 @@ def test_strengths_spread_within_the_declared_starts(name: str) -> None:
 def test_every_command_stays_in_reach_and_repeats() -> None:
     for seed in SEEDS:
         generator = np.random.default_rng(seed)
-        known = known_valve(drawn_valve(generator), generator)
+        known = guess_valve(draw_valve(generator), generator)
         command_pa = excitation(known, generator, 3001)
         most = (known.spring_n_per_m * known.stroke_m + known.coulomb_n) / known.diaphragm_area_m2
         assert command_pa.size == 3001

@@ -20,7 +20,7 @@ from workbench.diagnosis.diagnosis import Diagnosis, diagnose
 from workbench.diagnosis.extension_journal import Journal
 from workbench.report import Subject, report_comparison, report_diagnosis, report_journal
 from workbench.report.page import plot
-from workbench.report.plot_series import drawn, extremes, running_s
+from workbench.report.plot_series import draw_series, extremes, running_s
 from workbench.select.experiment import Experiment
 
 plotly = pytest.importorskip("plotly")
@@ -285,7 +285,7 @@ def test_thinning_breaks_the_line_where_nothing_was_measured() -> None:
 
 def test_a_line_is_broken_where_the_clock_is_set_back() -> None:
     time_s = np.concatenate([np.arange(0.0, 5.0), np.arange(2.0, 6.0)])
-    series = drawn(time_s, np.arange(9.0))
+    series = draw_series(time_s, np.arange(9.0))
     assert np.flatnonzero(np.isnan(series.value)).tolist() == [5]
     assert np.all(np.diff(running_s(time_s)) > 0.0)
 

@@ -7,7 +7,7 @@ import pytest
 
 from config.drive import VALVE
 from signals.moves import Slip
-from workbench.compare.comparison_sentences import Findings, judged, sentences, shortened, slip_sentences
+from workbench.compare.comparison_sentences import Findings, judge_findings, sentences, shorten_notes, slip_sentences
 from workbench.compare.slip_matching import MatchedSlip, SlipEvents
 
 SLIPS = tuple(Slip(i, i + 1, 0.0, 1e-3 * (-1) ** i, (-1) ** i) for i in range(25))
@@ -53,14 +53,14 @@ def test_a_stem_at_rest_that_the_model_moves_is_said() -> None:
 
 def test_a_thousand_notes_are_counted_and_not_all_told() -> None:
     notes = [f"note {i}" for i in range(1000)]
-    assert shortened(notes) == (*notes[:8], "and 992 more of the kind")
-    assert shortened(notes[:9]) == tuple(notes[:9])
+    assert shorten_notes(notes) == (*notes[:8], "and 992 more of the kind")
+    assert shorten_notes(notes[:9]) == tuple(notes[:9])
 
 
 def test_a_sentence_of_slips_points_to_them_the_gravest_first_and_to_no_others() -> None:
     slips = [MatchedSlip(10.0 * i, (-1) ** i, i % 4 < 2, 0.0, (1.0 + 0.01 * i) * 1e-3) for i in range(24)]
     slips += [MatchedSlip(300.0 + i, 1, False, 0.0, 1e-6 * i) for i in range(4)]
-    told = judged(replace(FOUND, events=SlipEvents(tuple(slips), (), ())))
+    told = judge_findings(replace(FOUND, events=SlipEvents(tuple(slips), (), ())))
     said = next(each for each in told if each.text.startswith("after a reversal"))
     assert [each.begin_s for each in said.stretches] == [10.0 * i for i in range(23, -1, -1) if i % 4 < 2]
 
@@ -68,7 +68,7 @@ def test_a_sentence_of_slips_points_to_them_the_gravest_first_and_to_no_others()
 def test_where_most_of_the_error_is_the_worst_run_of_samples_is_shown_first() -> None:
     phase = np.where(np.isin(np.arange(100) // 10, (2, 5, 7)), 1, 0)
     residual_m = np.where(phase == 1, np.where(np.arange(100) // 10 == 5, 3e-3, 1e-3), 1e-5)
-    told = judged(replace(FOUND, phase=phase, residual_m=residual_m))
+    told = judge_findings(replace(FOUND, phase=phase, residual_m=residual_m))
     said = next(each for each in told if "of the squared error" in each.text)
     assert [round(each.begin_s) for each in said.stretches] == [5, 2, 7]
     assert said.stretches[0].end_s == pytest.approx(5.9)

@@ -39,10 +39,10 @@ def test_a_preload_that_imitates_an_asymmetry_which_was_not_tried_is_no_explanat
     asked: list[SearchedForms] = []
 
     def searched(*args: Any, **settings: Any) -> SearchedForms:
-        asked.append(form_search.searched_forms(*args, **settings))
+        asked.append(form_search.search_forms(*args, **settings))
         return asked[-1]
 
-    monkeypatch.setattr(stand_in, "searched_forms", searched)
+    monkeypatch.setattr(stand_in, "search_forms", searched)
     monkeypatch.setattr(form_search, "FORMS", tuple(each for each in FORMS if each.name in FEW))
     found = diagnose(recording, valve, effects=("preload",))
     assert found.best.explained, "it reaches the floor: by what is left alone it would be called all that is missing"

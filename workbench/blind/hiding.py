@@ -77,14 +77,14 @@ def hide(
         raise InputError("period_s", f"must be above 0 and at most duration_s, got {period_s:g} of {duration_s:g} s")
     streams = np.random.SeedSequence(seed).spawn(5)
     for_valve, for_effects, for_fit, for_test, for_salt = map(np.random.default_rng, streams)
-    valve = drawn_valve(for_valve)
-    known = known_valve(valve, for_valve)
-    drawn = drawn_effects(for_effects, effects) if isinstance(effects, int) else find_effects(effects, "effects")
+    valve = draw_valve(for_valve)
+    known = guess_valve(valve, for_valve)
+    drawn = draw_effects(for_effects, effects) if isinstance(effects, int) else find_effects(effects, "effects")
     count = round(duration_s / period_s) + 1
     trials = [Trial(excitation(known, each, count), period_s) for each in (for_fit, for_test)]
     truth, answers = _moving(trials, drawn, valve, known, for_effects)
     fit, test = (
-        _recorded(trial, truth, clean, generator, dirty=dirty, pressure=pressure)
+        _record_trial(trial, truth, clean, generator, dirty=dirty, pressure=pressure)
         for trial, clean, generator in zip(trials, answers, (for_fit, for_test), strict=True)
     )
     answer = {
@@ -111,7 +111,7 @@ def _moving(
             return truth, answers
 
 
-def _recorded(
+def _record_trial(
     trial: Trial, truth: ValveFile, clean: Answer, generator: Draw, *, dirty: bool, pressure: bool
 ) -> tuple[Recording, float]:
     """Return the recording and its floor, m."""
@@ -131,7 +131,7 @@ def _visible(
     return {"fit_m": fit_m, "test_m": test_m, "is_visible": fit_m > VISIBLE_FLOORS * floor_m}
 
 
-def drawn_valve(generator: Draw) -> ValveParameters:
+def draw_valve(generator: Draw) -> ValveParameters:
     """Draw a bare valve near the shipped one."""
     shipped = load_valve(find_valve("seed")).valve
     coulomb_n = _between(generator, 250.0, 1424.0)
@@ -146,7 +146,7 @@ def drawn_valve(generator: Draw) -> ValveParameters:
     )
 
 
-def known_valve(valve: ValveParameters, generator: Draw) -> ValveParameters:
+def guess_valve(valve: ValveParameters, generator: Draw) -> ValveParameters:
     """Return what an engineer knows of a valve: the drawing's spring, and guesses of friction."""
     coulomb_n = valve.coulomb_n * _between(generator, 0.75, 1.33)
     return valve.model_copy(
@@ -159,7 +159,7 @@ def known_valve(valve: ValveParameters, generator: Draw) -> ValveParameters:
     )
 
 
-def drawn_effects(generator: Draw, count: int) -> list[Effect]:
+def draw_effects(generator: Draw, count: int) -> list[Effect]:
     """Draw different effects, no two of which are one by algebra."""
     pool = [shipped_effect(name, "shipped effects") for name in first_effects()]
     order = [pool[i] for i in generator.permutation(len(pool))]

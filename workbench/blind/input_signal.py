@@ -59,7 +59,7 @@ def excitation(valve: ValveParameters, generator: np.random.Generator, count: in
         generator: draws levels, lengths and the order of the moves.
         count: number of samples, some hundred at least.
     """
-    gentle = (ramp, creep, staircase, interrupted, sawtooth)
+    gentle = (ramp, creep, staircase, interrupt_leg, sawtooth)
     opening = [step, *(gentle[i] for i in generator.permutation(len(gentle)))]
     closing = [(step, *gentle)[i] for i in generator.permutation(1 + len(gentle))]
     moves = [move for pair in zip(opening, closing, strict=True) for move in pair]
@@ -70,11 +70,11 @@ def excitation(valve: ValveParameters, generator: np.random.Generator, count: in
     early = round(FIRST_PASSAGE_SHARE * count)
     rest = round(FIRST_REST_SHARE * early)
     counts = [
-        *_shared(generator, early - rest, MOVES_OF_FIRST),
-        *_shared(generator, count - 2 * early, len(moves) - MOVES_OF_FIRST),
+        *_share_samples(generator, early - rest, MOVES_OF_FIRST),
+        *_share_samples(generator, count - 2 * early, len(moves) - MOVES_OF_FIRST),
     ]
     legs = [Leg(*ends, n, band_pa, excess_pa) for ends, n in zip(pairwise(levels), counts, strict=True)]
-    parts = [_rested(move, leg, generator) for move, leg in zip(moves, legs, strict=True)]
+    parts = [_rest_after(move, leg, generator) for move, leg in zip(moves, legs, strict=True)]
     first = [np.full(rest, home_pa), *parts[:MOVES_OF_FIRST]]
     return np.concatenate([*first, *parts[MOVES_OF_FIRST:], *first])
 
@@ -100,13 +100,13 @@ def _level_pa(valve: ValveParameters, generator: np.random.Generator, *, opens: 
     return slides_pa(valve, generator.uniform(*span) * valve.stroke_m)
 
 
-def _shared(generator: np.random.Generator, count: int, parts: int) -> list[int]:
+def _share_samples(generator: np.random.Generator, count: int, parts: int) -> list[int]:
     """Share samples out to the parts of a passage."""
     ends = np.cumsum(generator.uniform(*LENGTHS, parts))
     return [int(each) for each in np.diff(np.round(count * ends / ends[-1]), prepend=0.0)]
 
 
-def _rested(move: Move, leg: Leg, generator: np.random.Generator) -> Column:
+def _rest_after(move: Move, leg: Leg, generator: np.random.Generator) -> Column:
     """Make the move in a part of the leg's samples, and rest at its end; never below the atmosphere."""
     moving = round((1.0 - generator.uniform(*RESTS)) * leg.count)
     made = move(replace(leg, count=moving), generator)
@@ -146,7 +146,7 @@ def staircase(leg: Leg, generator: np.random.Generator) -> Column:
     return np.asarray(stairs[np.arange(leg.count) * stairs.size // leg.count])
 
 
-def interrupted(leg: Leg, generator: np.random.Generator) -> Column:
+def interrupt_leg(leg: Leg, generator: np.random.Generator) -> Column:
     """Go straight with two rests on the way, late enough for the stem to be moving; Pa, (leg.count,)."""
     places = np.sort(generator.uniform(0.6, 0.9, 2))
     waits = generator.uniform(0.1, 0.3, 2)

@@ -20,7 +20,7 @@ from config.results.result import Result
 from config.valve_file import ValveFile
 from signals.moves import Slip, slips
 from sim.composition import Composition
-from workbench.compare.comparison_sentences import Findings, Stretch, judged, shortened
+from workbench.compare.comparison_sentences import Findings, Stretch, judge_findings, shorten_notes
 from workbench.compare.friction_balance import Forces, FrictionBalance, balance, forces, join_forces
 from workbench.compare.measures import fit_percent, rms, robust, valid_rows
 from workbench.compare.phases import PHASES, phases
@@ -137,7 +137,7 @@ class Comparison(Result):
             *(f"  {sentence}" for sentence in self.sentences),
             _phase_table(self.phases, length),
             *self._slips_and_residual(),
-            *(f"recording: {note}" for note in shortened(self.notes)),
+            *(f"recording: {note}" for note in shorten_notes(self.notes)),
         ]
 
     @property
@@ -215,7 +215,7 @@ def compare_record(record: Record, valve: ValveFile) -> Comparison:
     residual_m = np.where(rows, run.indicated_m - record.position_m, np.nan)
     segments = [_segment_findings(valve, record, run, first, end) for first, end in record.segments]
     phase, direction = _spread(record, segments)
-    events = _joined([each.events for each in segments])
+    events = _join_events([each.events for each in segments])
     velocity = np.concatenate([each.velocity_m_per_s for each in segments])
     even, period_s = _evenly(record, residual_m)
     autocorrelated = autocorrelation(even[1], period_s)
@@ -237,7 +237,7 @@ def compare_record(record: Record, valve: ValveFile) -> Comparison:
         close=record.floor_m is not None
         and error_m <= max(ADEQUATE * record.floor_m, NUMERICAL * valve.valve.stroke_m),
     )
-    said = judged(found)
+    said = judge_findings(found)
     simulated_rows = np.concatenate([np.arange(first, end) for first, end in record.segments])
     valid = rows[simulated_rows]
     return Comparison(
@@ -342,7 +342,7 @@ def _spread(record: Record, segments: Sequence[_SegmentFindings]) -> tuple[NDArr
     return phase, direction
 
 
-def _joined(events: Sequence[SlipEvents]) -> SlipEvents:
+def _join_events(events: Sequence[SlipEvents]) -> SlipEvents:
     return SlipEvents(
         tuple(pair for each in events for pair in each.matched),
         tuple(t for each in events for t in each.missed_s),

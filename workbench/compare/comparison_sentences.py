@@ -99,7 +99,7 @@ class Findings:
         return bool(self.ways) and self.close and not self.depends_on_input and not unmatched
 
 
-def judged(found: Findings) -> tuple[Sentence, ...]:
+def judge_findings(found: Findings) -> tuple[Sentence, ...]:
     """Return what is to be said."""
     if not found.ways:
         spurious = found.events.spurious_s
@@ -125,7 +125,7 @@ def judged(found: Findings) -> tuple[Sentence, ...]:
 
 def sentences(found: Findings) -> tuple[str, ...]:
     """Return the sentences alone."""
-    return tuple(each.text for each in judged(found))
+    return tuple(each.text for each in judge_findings(found))
 
 
 def slip_sentences(events: SlipEvents, length: Scale) -> Mapping[str, tuple[str, ...]]:
@@ -144,7 +144,7 @@ def _slip(each: MatchedSlip, length: Scale) -> str:
     return f"slip at {each.time_s:.2f} s, {way}: the model comes {late} and ends {far}"
 
 
-def shortened(notes: Sequence[str]) -> tuple[str, ...]:
+def shorten_notes(notes: Sequence[str]) -> tuple[str, ...]:
     """Return what is said of a recording, many of a kind only begun: a bad line may lose samples by the thousand."""
     if len(notes) <= MOST_LISTED + 1:
         return tuple(notes)

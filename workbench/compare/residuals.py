@@ -87,7 +87,7 @@ def profile(over: Column, values: Column, bins: int = BINS) -> Profile:
 
 def autocorrelation(residual_m: Column, period_s: float) -> Correlation:
     """Return rho at lags 0 to 25, (26,), of an evenly sampled residual, m, (n,), with the 99 % band (Ljung, 16.6)."""
-    rho = _correlated(residual_m, residual_m)
+    rho = _correlate(residual_m, residual_m)
     lag = np.arange(min(RESIDUAL_LAGS + 1, residual_m.size))
     return Correlation(lag, np.asarray(lag * period_s, np.float64), rho[lag], BAND_99 / residual_m.size**0.5)
 
@@ -102,14 +102,14 @@ def cross_correlation(command_pa: Column, residual_m: Column, period_s: float) -
     lag = np.arange(-reach, reach + 1)
     memory = np.arange(1, max(2, int(MEMORY * n)))
     taper = 1.0 - memory / memory.size
-    both = _correlated(command_pa, command_pa)[memory] * _correlated(residual_m, residual_m)[memory]
+    both = _correlate(command_pa, command_pa)[memory] * _correlate(residual_m, residual_m)[memory]
     variance = max(1.0, 1.0 + 2.0 * float(np.sum(taper * both))) / n
     return Correlation(
-        lag, np.asarray(lag * period_s, np.float64), _correlated(command_pa, residual_m)[lag], BAND_99 * variance**0.5
+        lag, np.asarray(lag * period_s, np.float64), _correlate(command_pa, residual_m)[lag], BAND_99 * variance**0.5
     )
 
 
-def _correlated(first: Column, second: Column) -> Column:
+def _correlate(first: Column, second: Column) -> Column:
     """Return the correlation by lag; negative lags at the end, as numpy indexes them."""
     a, b = first - first.mean(), second - second.mean()
     size = 1 << (2 * a.size - 1).bit_length()

@@ -16,7 +16,7 @@ from config.results.block import Block
 from config.results.result import Result
 from config.valve_file import ValveFile
 from sim.effect import Effect, find_effect, find_effects, tried_effects
-from workbench.compare.comparison_sentences import shortened
+from workbench.compare.comparison_sentences import shorten_notes
 from workbench.data.held_out import Split, split
 from workbench.data.noise_floor import UNKNOWN, told
 from workbench.diagnosis.as_given import AsGiven
@@ -154,7 +154,7 @@ class Diagnosis(Result, ForwardSelection[EvaluatedModel, EffectCandidate]):
         records = self.split.records
         noted = dict.fromkeys(note for each in records for note in each.notes)
         in_verdict = {UNKNOWN, *(each.early.sentence for each in records if each.early)}
-        said += [f"recording: {note}" for note in shortened([note for note in noted if note not in in_verdict])]
+        said += [f"recording: {note}" for note in shorten_notes([note for note in noted if note not in in_verdict])]
         said += [f"not tried: {', '.join(names)}: it {why}" for why, names in _by_reason(self.unseen).items()]
         if self.best.fit.from_pressure:
             said += floor_by_pressure(self.split, self.kind)

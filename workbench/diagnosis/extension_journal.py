@@ -8,7 +8,7 @@ from typing import Self
 
 from config.drive import Scale
 from config.errors import InputError
-from config.loading import Schema, validated
+from config.loading import Schema, validate
 from config.whole_file import beside
 from config.writing import write_valve
 from workbench.diagnosis.extension import Extension
@@ -85,7 +85,7 @@ class Journal(Schema):
 
     def followed_by(self, extension: Extension) -> Self:
         """Return the journal with one more step."""
-        return validated(type(self), {"steps": (*self.steps, ExtensionStep.of(extension))}, "journal")
+        return validate(type(self), {"steps": (*self.steps, ExtensionStep.of(extension))}, "journal")
 
     def write_beside(self, valve: Path) -> None:
         """Write the journal of a valve file."""

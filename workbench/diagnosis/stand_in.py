@@ -22,7 +22,7 @@ from config.valve_file import ValveFile
 from sim.effect import Effect
 from workbench.data.held_out import Split
 from workbench.diagnosis.kept_mass import leaves_something
-from workbench.discover.form_search import FIRST_TURN_FORMS, searched_forms
+from workbench.discover.form_search import FIRST_TURN_FORMS, search_forms
 from workbench.select.block_errors import AT_FLOOR, NOISE_KNOWN_TO
 from workbench.select.effect_candidates import EffectStep, EvaluatedModel, outdoes
 from workbench.select.effect_search import Progress
@@ -84,7 +84,7 @@ def stand_in(
     named = tuple(step.added.name for step in added if step.added)
     rivals = [each.name for step in added for each in step.indistinguishable]
     places = {place for name in (*named, *rivals) for place in _places(name, library)} if len(named) == 1 else set()
-    found = searched_forms(
+    found = search_forms(
         parts,
         valve,
         steps[0].before,

@@ -104,7 +104,7 @@ def added_force(
     over = np.linspace(*span, POINTS)
     added: dict[str, list[float]] = {}
     for xi in over.tolist():
-        for name, value in _added(form, namespace, q, xi, fit).items():
+        for name, value in _force_at(form, namespace, q, xi, fit).items():
             added.setdefault(name, []).append(value)
     unit, of = UNITS.get(form.variable.name, "of the stroke"), OF[form.place.function]
     return AddedForce(over, {name: np.array(each) for name, each in added.items()}, form.variable.words, unit, of)
@@ -117,7 +117,7 @@ UNITS = {
 OF = {"force": "N", "friction": "N", "pressure": "Pa", "sensor": "m"}
 
 
-def _added(form: Form, namespace: Mapping[str, Any], q: Any, xi: float, fit: Fit) -> dict[str, float]:
+def _force_at(form: Form, namespace: Mapping[str, Any], q: Any, xi: float, fit: Fit) -> dict[str, float]:
     """Return what a form adds where its variable is xi."""
     valve = fit.valve.valve
     known = _stem(form, q, xi, valve.stroke_m)

@@ -68,7 +68,7 @@ def curve_of(form: Form, values: Mapping[str, float], span: tuple[float, float])
         for i, s in enumerate(knots)
     )
     curve = Shape(
-        "curve", "follows a curve over", f"g smooth through g_i at {{0}} = {_told(knots)}", "curve({0}, q)", heights,
+        "curve", "follows a curve over", f"g smooth through g_i at {{0}} = {_list(knots)}", "curve({0}, q)", heights,
         functions=_function(knots),
     )  # fmt: skip
     place = replace(form.place, strength=scale)
@@ -91,7 +91,7 @@ def _knots(form: Form, values: Mapping[str, float], span: tuple[float, float]) -
     return [float(f"{each:.5g}") for each in kept]
 
 
-def _told(knots: list[float]) -> str:
+def _list(knots: list[float]) -> str:
     return ", ".join(f"{each:.4g}" for each in knots)
 
 

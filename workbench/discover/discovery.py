@@ -21,7 +21,7 @@ from config.valve_file import ValveFile
 from workbench.data.held_out import Split, split
 from workbench.data.noise_floor import told
 from workbench.discover.added_force import Landing, landings
-from workbench.discover.form_search import searched_forms
+from workbench.discover.form_search import search_forms
 from workbench.discover.found_form import FoundForm
 from workbench.fit.fitted_parameter import parameter_table
 from workbench.select.candidate_table import candidate_columns, candidate_table, lengths
@@ -162,7 +162,7 @@ def discover(
     parts = search.split
     if base.explained or parts.floor_m is None or parts.early:
         return Discovery("explained" if base.explained and not parts.early else "unjudged", base, (), (), (), parts, ())
-    searched = searched_forms(parts, valve, base, workers=threads, progress=tell, on_proposal=on_proposal)
+    searched = search_forms(parts, valve, base, workers=threads, progress=tell, on_proposal=on_proposal)
     found = searched.found
     outcome: Outcome = "none" if not found else "found" if len(found) == 1 else "one_of"
     missing = tuple(landings(base.fit, parts))

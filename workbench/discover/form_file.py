@@ -41,7 +41,7 @@ def form_text(form: Form, found: Mapping[str, float] | None = None, remarks: Seq
         *(fill(each, LINE_CHARACTERS) for each in remarks),
         '"""',
     ]
-    parameters = "\n".join(_declared(each, _begin(each, found)) for each in form.quantities)
+    parameters = "\n".join(_declare_quantity(each, _begin(each, found)) for each in form.quantities)
     names = ", ".join(each.symbol for each in form.quantities)
     return (
         "\n\n".join(
@@ -85,7 +85,7 @@ def _constants(form: Form) -> str:
     return "\n".join([*lines, *(['INVERSE = "balance"'] if form.place.inverse else [])])
 
 
-def _declared(each: Quantity, found: float | None) -> str:
+def _declare_quantity(each: Quantity, found: float | None) -> str:
     starts, scale = (each.starts, each.scale) if found is None else ((found,), "")
     words = [repr(each.text), f"{each.least!r}", f"{each.most!r}"]
     words += [f"off={each.off!r}"] if each.off is not None else []

@@ -19,7 +19,7 @@ from workbench.discover.curve import curve_of, has_curve
 from workbench.discover.form_file import write_forms
 from workbench.discover.found_form import FoundForm
 from workbench.discover.grammar import FORMS, Form
-from workbench.discover.proposal import Point, proposed
+from workbench.discover.proposal import Point, propose_forms
 from workbench.fit.fit_result import Fit
 from workbench.fit.fitting import effect_fit, problem_of
 from workbench.fit.problem import Problem
@@ -45,7 +45,7 @@ class SearchedForms(Brief):
     """Forms that were not fitted."""
 
 
-def searched_forms(
+def search_forms(
     parts: Split,
     valve: ValveFile,
     base: EvaluatedModel,
@@ -95,7 +95,7 @@ class FormSearch:
 
     def run(self, on_proposal: Callable[[tuple[str, ...]], None], most: int) -> SearchedForms:
         """Rank and fit the forms, the likeliest first, until one leaves nothing to explain."""
-        order = proposed(
+        order = propose_forms(
             self.base.fit, self.of, self.effects, self.workers, lambda done: self.tell("ranking the forms", done)
         )
         on_proposal(tuple(self.forms[each.name].name for each in order))

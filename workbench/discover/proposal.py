@@ -40,7 +40,7 @@ class Proposal:
     points: tuple[Point, ...]
 
 
-def proposed(
+def propose_forms(
     base: Fit,
     of: Problem,
     effects: Mapping[str, Effect],
@@ -63,14 +63,14 @@ def proposed(
     for name, each in zip(names, found, strict=True):
         shares[name] = each
         tell(len(shares) / len(names))
-    evidence = {name: [_promised(effects[name], max(each), base) for each in shares[name]] for name in names}
+    evidence = {name: [_promise_evidence(effects[name], max(each), base) for each in shares[name]] for name in names}
     by_all = sorted(names, key=lambda name: -evidence[name][0])
     by_landings = sorted(names, key=lambda name: -evidence[name][1])
     order = dict.fromkeys(chain.from_iterable(zip(by_all, by_landings, strict=True)))
     return tuple(Proposal(name, _begins(effects[name], points[name], shares[name])) for name in order)
 
 
-def _promised(effect: Effect, share: float, base: Fit) -> float:
+def _promise_evidence(effect: Effect, share: float, base: Fit) -> float:
     """Return the evidence that a share of what is left, from 0 to 1, promises."""
     n, fitted = base.terms.events, sum(not each.given for each in effect.parameters.values())
     return -n * log(max(1.0 - share, LEAST_REST)) - fitted * log(n)

@@ -30,7 +30,7 @@ from workbench.discriminate.experiment_design import (
     DesignedExperiment,
     Terms,
 )
-from workbench.discriminate.measured_pressure import raced_by_pressure
+from workbench.discriminate.measured_pressure import race_by_pressure
 from workbench.discriminate.rival_race import ODDS, RivalRace
 from workbench.fit.fit_result import Fit
 from workbench.fit.fitted_parameter import parameters_json
@@ -226,7 +226,7 @@ def discriminate(
     """
     gathered = tuple(tuple(sorted(each, key=list(fits).index)) for each in classes(fits, library))
     if len(gathered) > 1:
-        fits = raced_by_pressure(fits, recordings, library, workers)
+        fits = race_by_pressure(fits, recordings, library, workers)
     race = RivalRace({each[0]: fits[each[0]] for each in gathered}, tuple(recordings), workers)
     rounds: list[Round] = []
     experiments: list[Recording] = []
@@ -237,7 +237,7 @@ def discriminate(
     while outcome is None:
         left, number = budget - used, len(rounds) + 1
         tell(f"choosing experiment {number}", used / budget)
-        chosen = _chosen(race, Terms(bounds, left, seed + len(rounds), frozenset(waiting)), design)
+        chosen = _choose_experiment(race, Terms(bounds, left, seed + len(rounds), frozenset(waiting)), design)
         if chosen is None or chosen.separation < IMITATED:
             if waiting:
                 waiting.clear()
@@ -265,7 +265,7 @@ def discriminate(
     return Discrimination(outcome, named, gathered, tuple(rounds), race.odds, race.fits, tuple(experiments), problem)
 
 
-def _chosen(race: RivalRace, terms: Terms, design: Designer) -> DesignedExperiment | None:
+def _choose_experiment(race: RivalRace, terms: Terms, design: Designer) -> DesignedExperiment | None:
     """Return the shortest experiment that will do by what it separates, or else the one that separates most."""
     best = None
     for most in sorted({min(each, terms.most_moves) for each in (FEW_MOVES, MOST_MOVES)}):

@@ -165,7 +165,7 @@ class DesignedExperiment(Brief):
         return Experiment(self.course.name, self.separation, *self.course.sampled(period_s))
 
 
-def designed(
+def design_experiment(
     fits: Sequence[Fit],
     record: Record,
     terms: Terms,
@@ -195,16 +195,16 @@ def designed(
         return least(rivalry.stepped(course))
 
     def changed(i: int) -> Course:
-        return improved(score, starts[i], least(rated[i]), terms.bounds, np.random.default_rng([terms.seed, i]))
+        return improve_course(score, starts[i], least(rated[i]), terms.bounds, np.random.default_rng([terms.seed, i]))
 
-    def ranked(found: Sequence[Course], draws: Sequence[int]) -> list[tuple[float, Course]]:
+    def rank_courses(found: Sequence[Course], draws: Sequence[int]) -> list[tuple[float, Course]]:
         refitted = on_threads(lambda course: least(rivalry.refitted(course, draws)), found, workers)
         return sorted(zip(refitted, found, strict=True), key=lambda each: -each[0])
 
     kept = sorted(inside, key=lambda i: -least(rated[i]))[:KEPT]
     found = [*on_threads(changed, kept, workers), *(starts[i] for i in kept)]
-    better = [course for _, course in ranked(found, CHECKED[:1])][:KEPT]
-    separation, best = ranked(better, CHECKED)[0]
+    better = [course for _, course in rank_courses(found, CHECKED[:1])][:KEPT]
+    separation, best = rank_courses(better, CHECKED)[0]
     return DesignedExperiment(best, exp(separation))
 
 
@@ -219,27 +219,27 @@ def told_apart(rated: NDArray[np.float64], least: float) -> NDArray[np.bool_]:
     return told if told.any() else np.ones_like(told)
 
 
-def improved(
+def improve_course(
     score: Callable[[Course], float], course: Course, most: float, bounds: Bounds, generator: np.random.Generator
 ) -> Course:
     """Return a course changed at random, a change kept if it scores more than all before; `most`: as it is."""
     for _ in range(TRIED_CHANGES):
-        changed = _changed_inside(course, bounds, generator)
+        changed = _change_inside(course, bounds, generator)
         there = score(changed)
         if there > most:
             course, most = changed, there
     return course
 
 
-def _changed_inside(course: Course, bounds: Bounds, generator: np.random.Generator) -> Course:
+def _change_inside(course: Course, bounds: Bounds, generator: np.random.Generator) -> Course:
     """Return a course with one leg changed, or all lengths, or its first level; as it is where that takes too long."""
     try:
-        return _changed(course, bounds.maximum_pa - bounds.minimum_pa, generator).within(bounds)
+        return _change_course(course, bounds.maximum_pa - bounds.minimum_pa, generator).within(bounds)
     except InputError:
         return course
 
 
-def _changed(course: Course, span_pa: float, generator: np.random.Generator) -> Course:
+def _change_course(course: Course, span_pa: float, generator: np.random.Generator) -> Course:
     size = 10.0 ** generator.uniform(-2.0, -0.3)
     what, i = generator.integers(5), int(generator.integers(len(course.legs)))
     if what == 0:

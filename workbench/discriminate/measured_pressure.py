@@ -24,7 +24,7 @@ MOSTLY = 0.9
 """Of the samples."""
 
 
-def raced_by_pressure(
+def race_by_pressure(
     fits: Mapping[str, Fit], recordings: Sequence[Recording], library: Mapping[str, Effect], workers: int | None
 ) -> Mapping[str, Fit]:
     """Return the rivals from the measured pressure on; as they are where that tells nothing more.
@@ -40,12 +40,12 @@ def raced_by_pressure(
         return fits
     record = ready(joined(recordings))
 
-    def refitted(found: Fit) -> Fit:
+    def refit_rival(found: Fit) -> Fit:
         free = [name for name in found.parameters if name.partition(".")[0] not in on_path]
         driven = Problem(record, told_moves(record), found.by, from_pressure=True, load_n=found.load_n)
         return base_fit(driven, found.valve, free=free)
 
-    found = dict(zip(fits, on_threads(refitted, list(fits.values()), workers), strict=True))
+    found = dict(zip(fits, on_threads(refit_rival, list(fits.values()), workers), strict=True))
     least_m, before_m = (min(fit.rms_m for fit in each.values()) for each in (found, fits))
     return found if least_m < before_m else fits
 

@@ -25,7 +25,7 @@ from config.recording import Recording
 from sim.karnopp import Vector
 from workbench.data.held_out import Part, joined
 from workbench.data.record import ready, require_few_samples, require_fittable
-from workbench.discriminate.experiment_design import DesignedExperiment, Terms, designed
+from workbench.discriminate.experiment_design import DesignedExperiment, Terms, design_experiment
 from workbench.fit.fit_result import Fit
 from workbench.fit.fitting import problem_of, refit
 from workbench.fit.threads import on_threads
@@ -133,7 +133,7 @@ class RivalRace:
 
     def experiment(self, terms: Terms) -> DesignedExperiment | None:
         """Return the experiment designed for the likeliest rivals; None if no course stays inside the bounds."""
-        return designed(self.alive[:ASKED], self.record, terms, workers=self._workers)
+        return design_experiment(self.alive[:ASKED], self.record, terms, workers=self._workers)
 
     @property
     def explained(self) -> bool:
@@ -156,9 +156,9 @@ class RivalRace:
         """Return it after another recording: every rival fitted anew to all, from where it was."""
         race = RivalRace(self.fits, (*self._recordings, recording), self._workers, self._begun)
 
-        def refitted(found: Fit) -> Fit:
+        def refit_rival(found: Fit) -> Fit:
             return refit(problem_of(found, race.record), found)
 
-        fits = on_threads(refitted, tuple(self.fits.values()), self._workers)
+        fits = on_threads(refit_rival, tuple(self.fits.values()), self._workers)
         race.fits = dict(zip(self.fits, fits, strict=True))
         return race

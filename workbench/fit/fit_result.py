@@ -16,7 +16,7 @@ from config.valve_file import ValveFile
 from signals.independence import independent_share
 from sim.composition import STATIC, Composition
 from sim.karnopp import Vector
-from workbench.compare.comparison_sentences import shortened
+from workbench.compare.comparison_sentences import shorten_notes
 from workbench.compare.measures import fit_percent
 from workbench.data.noise_floor import told
 from workbench.data.record import Record, ready
@@ -170,7 +170,7 @@ class Fit(Result):
             f"{self.agreement} {agreement}",
             parameter_table(self.parameters, self.kind),
             *([self.by.sentence] if self.by.sentence else []),
-            *(f"recording: {note}" for note in shortened(self.notes)),
+            *(f"recording: {note}" for note in shorten_notes(self.notes)),
         ]
 
     def frame_columns(self) -> dict[str, list[object]]:

@@ -23,7 +23,7 @@ from threading import Event, Thread
 from typing import Any, Protocol
 
 from config.errors import CommandFailed, InputError
-from config.extras import needed
+from config.extras import import_extra
 from workbench.fleet.examination import Examination, Request, examine, unreadable
 
 WHO = "positioner fleet"
@@ -57,8 +57,8 @@ def cluster(scheduler: str | None, workers: int | None) -> Iterator[Any]:
         InputError: nobody answers at the address, or its workers are none of ours.
         ModuleNotFoundError: Dask is not installed; names the extra.
     """
-    distributed = needed("distributed", WHO)
-    needed("dask", WHO).config.set(SETTINGS)
+    distributed = import_extra("distributed", WHO)
+    import_extra("dask", WHO).config.set(SETTINGS)
     if scheduler is not None:
         logging.getLogger("distributed.client").setLevel(logging.CRITICAL)  # a scheduler that goes is told in one line
         try:
@@ -118,7 +118,7 @@ def work(client: Any, courses: Sequence[Course], time_limit_s: float = TIME_LIMI
     Raises:
         CommandFailed: the scheduler is gone.
     """
-    distributed = needed("distributed", WHO)
+    distributed = import_extra("distributed", WHO)
     waiting = deque(courses)
     under_way: dict[str, tuple[Course, Any]] = {}
     answers = distributed.as_completed()
@@ -136,7 +136,7 @@ def work(client: Any, courses: Sequence[Course], time_limit_s: float = TIME_LIMI
                 under_way[future.key] = course, future
                 answers.add(future)
 
-    with _told_when_gone(), _limited(client, time_limit_s, lambda key: under_way[key][1].cancel()) as overdue:
+    with _tell_when_gone(), _limit_time(client, time_limit_s, lambda key: under_way[key][1].cancel()) as overdue:
         fill()
         for future in answers:
             course, _ = under_way.pop(future.key)
@@ -146,7 +146,7 @@ def work(client: Any, courses: Sequence[Course], time_limit_s: float = TIME_LIMI
 
 
 @contextmanager
-def _limited(client: Any, time_limit_s: float, give_up: Callable[[str], None]) -> Iterator[set[str]]:
+def _limit_time(client: Any, time_limit_s: float, give_up: Callable[[str], None]) -> Iterator[set[str]]:
     """Give up what is under way for longer than a limit, on a thread of its own; gives the keys of what was."""
     clocks, overdue, ended = _Clocks(), set[str](), Event()
 
@@ -197,7 +197,7 @@ class _Clocks:
 
 
 @contextmanager
-def _told_when_gone() -> Iterator[None]:
+def _tell_when_gone() -> Iterator[None]:
     """Say so in one line where the connection to the scheduler ends, at whatever it is asked.
 
     Raises:

@@ -145,7 +145,7 @@ class Examination(Schema):
 def examine(request: Request) -> Examination:
     """Examine a recording; whatever is wrong with it is the outcome."""
     try:
-        return _examined(request)
+        return _examine(request)
     except InputError as error:
         return unreadable(error.problem)
     except Exception as error:  # of one recording in ten thousand, of any kind: it is listed, the others go on
@@ -157,7 +157,7 @@ def unreadable(reason: str) -> Examination:
     return Examination(outcome=UNREADABLE, sentence=" ".join(reason.split()))
 
 
-def _examined(request: Request) -> Examination:
+def _examine(request: Request) -> Examination:
     recording = Recording.read(Path(request.recording))
     looked = compare(recording, request.model)
     figures = _figures(looked, request.model)
@@ -170,17 +170,17 @@ def _examined(request: Request) -> Examination:
             **figures,
         )
     try:
-        return _explained(recording, request, figures)
+        return _examine_adequate(recording, request, figures)
     except InputError as error:
         off = f"{1e3 * looked.rms_m:.3g} mm from what the last model says"
         return Examination(outcome=UNTOLD, sentence=f"{off}; why, cannot be told: {error.problem}", **figures)
 
 
-def _explained(recording: Recording, request: Request, figures: Mapping[str, Any]) -> Examination:
+def _examine_adequate(recording: Recording, request: Request, figures: Mapping[str, Any]) -> Examination:
     explained = refit(recording, request.model, request.floor_m)
     if explained is not None:
-        return _refitted(*explained, request, figures)
-    return _diagnosed(diagnose(recording, request.model, workers=1), request, figures)
+        return _examine_refit(*explained, request, figures)
+    return _examine_diagnosis(diagnose(recording, request.model, workers=1), request, figures)
 
 
 def refit(recording: Recording, model: ValveFile, known_floor_m: float | None = None) -> tuple[Fit, Comparison] | None:
@@ -194,11 +194,11 @@ def refit(recording: Recording, model: ValveFile, known_floor_m: float | None = 
     Raises:
         InputError: the recording holds too little.
     """
-    found, again = refitted(recording, model)
+    found, again = refit_valve(recording, model)
     return (found, again) if is_at_floor(again, model, known_floor_m) else None
 
 
-def refitted(recording: Recording, model: ValveFile) -> tuple[Fit, Comparison]:
+def refit_valve(recording: Recording, model: ValveFile) -> tuple[Fit, Comparison]:
     """Return the valve refitted, and how it compares, whatever it leaves.
 
     Raises:
@@ -255,7 +255,7 @@ def _figures(looked: Comparison, model: ValveFile) -> dict[str, Any]:
         "valid_share": float(valid.mean()),
         "travel_share": float(np.ptp(measured_m[valid]) / model.valve.stroke_m) if valid.any() else 0.0,
         "slips": len(looked.slips.matched) + len(looked.slips.missed_s),
-        "error_before_m": _known(looked.rms_m),
+        "error_before_m": _finite_or_none(looked.rms_m),
         "floor_m": looked.floor_m,
     }
 
@@ -268,7 +268,7 @@ def _friction(file: ValveFile) -> dict[str, Any]:
     return {"dead_band_share": 2.0 * valve.coulomb_n * per_n, "jump_share": (valve.static_n - valve.coulomb_n) * per_n}
 
 
-def _refitted(found: Fit, again: Comparison, request: Request, figures: Mapping[str, Any]) -> Examination:
+def _examine_refit(found: Fit, again: Comparison, request: Request, figures: Mapping[str, Any]) -> Examination:
     changes = changes_of(request.model, found.parameters)
     if not request.is_first:
         changes = _beyond_what_was_known(changes, request)
@@ -331,7 +331,7 @@ def _percent(change: Change) -> str:
     return f"{100.0 * (change.now / change.before - 1.0):+.0f} %"
 
 
-def _diagnosed(diagnosis: Diagnosis, request: Request, figures: Mapping[str, Any]) -> Examination:
+def _examine_diagnosis(diagnosis: Diagnosis, request: Request, figures: Mapping[str, Any]) -> Examination:
     accepted = diagnosis.verdict in {"missing", "adequate"}
     added = [step.added for step in diagnosis.steps if step.added]
     gain = added[0].gain if added else None
@@ -347,11 +347,11 @@ def _diagnosed(diagnosis: Diagnosis, request: Request, figures: Mapping[str, Any
         accepted = bool(changes) or request.is_first
     return Examination(
         **said,
-        error_after_m=_known(diagnosis.best.errors.test_rmse_m),
+        error_after_m=_finite_or_none(diagnosis.best.errors.test_rmse_m),
         effects=diagnosis.missing,
         rivals=tuple(name for names in diagnosis.indistinguishable for name in names if name not in diagnosis.missing),
-        evidence=_known(gain.bic) if gain else None,
-        held_out_evidence=_known(gain.held_out_evidence) if gain else None,
+        evidence=_finite_or_none(gain.bic) if gain else None,
+        held_out_evidence=_finite_or_none(gain.held_out_evidence) if gain else None,
         changes=changes,
         candidates=tuple(
             Tried(name=each.name, held_out_m=each.test, remark=each.rejection_reason)
@@ -363,5 +363,5 @@ def _diagnosed(diagnosis: Diagnosis, request: Request, figures: Mapping[str, Any
     )
 
 
-def _known(value: float) -> float | None:
+def _finite_or_none(value: float) -> float | None:
     return value if isfinite(value) else None

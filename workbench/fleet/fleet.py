@@ -74,7 +74,7 @@ class Fleet(Result):
         """Say how many valves deserve a look, which, and which recordings could not be read."""
         head = ("rank", "valve", "what", "since", "off by, % of stroke", "sure", "")
         rows = [
-            (str(rank), each.name, each.kind, _since(each), f"{100 * each.cost_share:.2f}", each.sure, _said(each))
+            (str(rank), each.name, each.kind, _since(each), f"{100 * each.cost_share:.2f}", each.sure, _say(each))
             for rank, each in enumerate(self.complaining, start=1)
         ]
         unknown = f", of {len(self.unknown)} nothing is known" if self.unknown else ""
@@ -230,7 +230,7 @@ def _since(course: ValveCourse) -> str:
     return f"{course.since:%Y-%m-%d}" if course.since else ""
 
 
-def _said(course: ValveCourse) -> str:
+def _say(course: ValveCourse) -> str:
     return course.gravest[1].sentence if course.gravest else ""
 
 

@@ -16,10 +16,10 @@ from workbench.fleet.valve_course import ValveCourse
 from workbench.report.page import (
     Html,
     Row,
-    folded,
+    fold_parts,
     heading_alone,
-    linked,
-    preformatted,
+    keep_lines,
+    link_to,
     section,
     table,
     text,
@@ -71,7 +71,7 @@ def _ranking(fleet: Fleet) -> Html:
         Row(
             (str(rank), course.name, course.kind, _since(course), _share(course), course.sure, ""),
             kind="over",
-            picture=linked(f"#history-{rank}", sparkline(course)),
+            picture=link_to(f"#history-{rank}", sparkline(course)),
         )
         for rank, course in enumerate(fleet.complaining, start=1)
     ]
@@ -95,15 +95,15 @@ def _drill_down(rank: int, course: ValveCourse, report: str | None) -> Html:
     tried = [Row((each.name, OF_VALVE.length(each.held_out_m), each.remark or "accepted")) for each in found.candidates]
     models = [Row((f"{each.when:%Y-%m-%d}", each.recording, each.found.sentence)) for each in course.models]
     command = f"positioner diagnose {entry.recording} --valve {entry.file} --report {course.name}.html"
-    return folded(
+    return fold_parts(
         f"valve-{rank}",
         f"{rank}. {course.name}: {course.kind}",
         text(found.sentence),
-        linked(report, Html("The diagnosis report")) if report else Html(""),
+        link_to(report, Html("The diagnosis report")) if report else Html(""),
         table(f"history-{rank}", ("when", "recording", "came of it", "error before, mm"), history, words=(0, 1, 2)),
         table(f"models-{rank}", ("model from", "by", "why"), models, words=(0, 1, 2)) if models else Html(""),
         table(f"tried-{rank}", ("effect", "held out, mm", ""), tried, words=(0, 2)) if tried else Html(""),
-        preformatted(command),
+        keep_lines(command),
     )
 
 

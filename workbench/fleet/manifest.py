@@ -21,7 +21,7 @@ from typing import Annotated, Any
 from pydantic import BeforeValidator, Field, Strict, TypeAdapter, ValidationError
 
 from config.errors import InputError
-from config.loading import FolderName, Many, Schema, read_toml, validated
+from config.loading import FolderName, Many, Schema, read_toml, validate
 from config.plain_file import read_plain
 
 KEYS = ("valve", "file", "recording", "when")
@@ -85,7 +85,7 @@ def read_manifest(path: Path) -> Manifest:
         InputError: names file, key, value and what is allowed.
     """
     tables = read_toml(path) if path.suffix == ".toml" else {"recording": _rows(path)}
-    entries = validated(Entries, tables, str(path)).recording
+    entries = validate(Entries, tables, str(path)).recording
     _refuse_doubles(path, entries)
     valves: defaultdict[str, list[Entry]] = defaultdict(list)
     for entry in entries:

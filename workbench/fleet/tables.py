@@ -16,7 +16,7 @@ from pathlib import Path
 from typing import Any
 
 from config.errors import InputError
-from config.extras import needed
+from config.extras import import_extra
 from config.whole_file import beside
 from workbench.fleet.examination import AS_BEFORE, Examination, unreadable
 from workbench.fleet.valve_course import Model, ValveCourse
@@ -117,8 +117,8 @@ def write_tables(courses: Sequence[ValveCourse], folder: Path) -> None:
         InputError: the folder cannot be written.
         ModuleNotFoundError: pyarrow is not installed; names the extra.
     """
-    arrow = needed("pyarrow", "positioner fleet")
-    parquet = needed("pyarrow.parquet", "positioner fleet")
+    arrow = import_extra("pyarrow", "positioner fleet")
+    parquet = import_extra("pyarrow.parquet", "positioner fleet")
     offset = any(entry.time.tzinfo for course in courses for entry, _ in course.examined)
     for name, (_, columns) in TABLES.items():
         path = folder / f"{name}.parquet"
@@ -167,7 +167,7 @@ def _valve(rank: int, course: ValveCourse) -> Mapping[str, Any]:
         "rank": rank,
         "valve": course.name,
         "kind": course.kind,
-        **_said(found),
+        **_examination_row(found),
         "since": course.since,
         "sure": course.sure,
         "cost_share": course.cost_share if course.readable else None,
@@ -185,7 +185,7 @@ def _recordings(courses: Sequence[ValveCourse]) -> Rows:
             "valve": course.name,
             "recording": entry.recording,
             "when": entry.time,
-            **_said(found),
+            **_examination_row(found),
             **_figures(found),
         }
         for course in courses
@@ -203,13 +203,13 @@ def _model(course: ValveCourse, model: Model) -> Mapping[str, Any]:
         "when": model.when,
         "recording": model.recording,
         "why": model.found.sentence,
-        **_said(model.found),
+        **_examination_row(model.found),
         **_figures(model.found),
         "text": model.text,
     }
 
 
-def _said(found: Examination) -> dict[str, str]:
+def _examination_row(found: Examination) -> dict[str, str]:
     changes = {each.name: [each.before, each.now, each.lower, each.upper] for each in found.changes}
     return {
         "outcome": found.outcome,

@@ -13,7 +13,7 @@ from dataclasses import dataclass, field
 from datetime import datetime
 
 from config.errors import InputError
-from config.loading import validated
+from config.loading import validate
 from config.valve_file import ValveFile
 from sim.effect import UNKNOWN_COMPLAINT, find_effect
 from workbench.fleet.examination import AS_BEFORE, CHANGED, UNREADABLE, UNTOLD, Change, Examination
@@ -188,4 +188,4 @@ def kinds_of_changes(changes: Sequence[Change]) -> list[str]:
 
 def valve_in(text: str) -> ValveFile:
     """Return the valve file of a model's text."""
-    return validated(ValveFile, tomllib.loads(text), "model")
+    return validate(ValveFile, tomllib.loads(text), "model")

@@ -153,7 +153,7 @@ class ForceModel:
     @property
     def free(self) -> int:
         """Shapes that were chosen."""
-        return (self.yield_m is not None) + sum(len(_chosen(each.effect)) for each in self.terms)
+        return (self.yield_m is not None) + sum(len(_trial_parameters(each.effect)) for each in self.terms)
 
 
 @dataclass(frozen=True, slots=True)
@@ -210,7 +210,7 @@ class Balance:
         shapes: dict[str, tuple[float, ...]] = {}
         for key, declared in effect.parameters.items():
             if key != strength:
-                tried = SHAPES[key] if key in _chosen(effect) else ()
+                tried = SHAPES[key] if key in _trial_parameters(effect) else ()
                 speeds = self.rows.velocity_m_per_s if key == "velocity_m_per_s" else None
                 unit = 1.0 if speeds is None else float(np.median(np.abs(speeds)))
                 shapes[key] = tuple(unit * each for each in tried) or declared.starts_for(self.valve)[:1]
@@ -260,10 +260,10 @@ class Balance:
         X = np.column_stack([each.values for each in columns])
         scale = np.maximum(np.abs(X).max(axis=0), np.finfo(float).tiny)
         least = np.array([each.least if bounded else -np.inf for each in columns])
-        reduced = {k: _reduced(X[self.fold == k] / scale, y[self.fold == k]) for k in range(int(self.fold.max()) + 1)}
+        reduced = {k: _reduce(X[self.fold == k] / scale, y[self.fold == k]) for k in range(int(self.fold.max()) + 1)}
         trained = [k for k in reduced if k not in self.held_out or len(self.held_out) == len(reduced)]
-        theta = _solved([reduced[k] for k in trained], least) / scale
-        others = {k: _solved([reduced[j] for j in reduced if j != k], least) / scale for k in self.held_out}
+        theta = _solve([reduced[k] for k in trained], least) / scale
+        others = {k: _solve([reduced[j] for j in reduced if j != k], least) / scale for k in self.held_out}
         residual_n, predicted_n = y - X @ theta, np.full(y.size, np.nan)
         for k, other in others.items():
             predicted_n[self.fold == k] = (y - X @ other)[self.fold == k]
@@ -319,8 +319,8 @@ class Balance:
     ) -> str:
         """Say which of the added coefficients the rows want below its range, by several of its own deviations."""
         free = np.full(least.size, -np.inf)
-        wanted = _solved([reduced[k] for k in trained], free)
-        draws = [_solved([reduced[j] for j in trained if j != k], free) for k in trained] if len(trained) > 2 else []
+        wanted = _solve([reduced[k] for k in trained], free)
+        draws = [_solve([reduced[j] for j in trained if j != k], free) for k in trained] if len(trained) > 2 else []
         deviations = _jackknife(draws)
         for i, each in enumerate(columns):
             spread = 0.0 if deviations is None else float(deviations[i])
@@ -342,7 +342,7 @@ class Balance:
         return [replace(before, terms=(*before.terms, each)) for each in self._terms(self.library[name])]
 
 
-def _chosen(effect: Effect) -> list[str]:
+def _trial_parameters(effect: Effect) -> list[str]:
     """Return the parameters of an effect's law that are chosen by trials."""
     return [key for key, each in effect.parameters.items() if key in SHAPES and len(each.starts) > 1]
 
@@ -389,12 +389,12 @@ def _rms(error_n: Column) -> float:
     return float(np.sqrt(np.mean(error_n**2)))
 
 
-def _reduced(X: Matrix, y: Column) -> Matrix:
+def _reduce(X: Matrix, y: Column) -> Matrix:
     """Return the triangle that holds all a least-squares problem knows of its rows."""
     return np.asarray(np.linalg.qr(np.column_stack([X, y]), mode="r"))
 
 
-def _solved(reduced: Sequence[Matrix], least: Column) -> Column:
+def _solve(reduced: Sequence[Matrix], least: Column) -> Column:
     whole = np.vstack(reduced)
     found = np.linalg.lstsq(whole[:, :-1], whole[:, -1])[0]
     if np.all(found >= least):

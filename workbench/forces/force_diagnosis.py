@@ -66,7 +66,7 @@ class ForceDiagnosis(Result, ForwardSelection[ForceFit, ForceCandidate]):
             title = (
                 f"step {number}: error {before.train_rms_n:.4g} N rms fitted, {before.test_rms_n:.4g} held out{floor}"
             )
-            said.append(candidate_table([_tried(each) for each in step.candidates], NEWTONS, title))
+            said.append(candidate_table([_describe_trial(each) for each in step.candidates], NEWTONS, title))
         rows = [
             (name, f"{value:.6g}", "" if std is None else f"{std:.2g}")
             for name, value in self.best.parameters.items()
@@ -79,17 +79,17 @@ class ForceDiagnosis(Result, ForwardSelection[ForceFit, ForceCandidate]):
 
     def frame_columns(self) -> dict[str, list[object]]:
         """Return a row a candidate of each step: errors, N, evidence, accepted or why not."""
-        return candidate_columns([_tried(each) for each in self.candidates], NEWTONS)
+        return candidate_columns([_describe_trial(each) for each in self.candidates], NEWTONS)
 
     def plot(self) -> "Figure":
         """Draw the held-out error with each effect in the first step; those added and their rivals in colour."""
         step = self.steps[0]
         chosen = {*self.missing, *(each.name for each in step.indistinguishable)}
-        tried = [_tried(each) for each in step.candidates]
+        tried = [_describe_trial(each) for each in step.candidates]
         return draw_race(tried, chosen, step.before.test_rms_n, self.floor_n, NEWTONS)
 
 
-def _tried(each: ForceCandidate) -> Tried:
+def _describe_trial(each: ForceCandidate) -> Tried:
     errors = (each.fit.train_rms_n, each.fit.test_rms_n, each.fit.median_error_n)
     return Tried(each.step, each.name, *errors, each.gain, each.rejection_reason)
 
@@ -113,10 +113,10 @@ def diagnose_forces(
     balance = Balance(rows, valve.valve, tested=test is not None)
     if balance.fitted(ForceModel(), bounded=False).parameters["coulomb_n"] < 0.0 and rows.load_n is not None:
         balance = Balance(rows.turned(), valve.valve, tested=test is not None)
-    return _searched(balance)
+    return _search(balance)
 
 
-def _searched(balance: Balance) -> ForceDiagnosis:
+def _search(balance: Balance) -> ForceDiagnosis:
     here = ForceModel()
     base = fit = balance.fitted(here)
     library = balance.library

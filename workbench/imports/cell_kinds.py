@@ -19,7 +19,7 @@ def begins_number(cell: Cell) -> bool:
     return not isinstance(cell, str) or _NUMBER_BEGINS.match(cell) is not None
 
 
-def parted(cell: str) -> tuple[str, str | None]:
+def split_unit(cell: str) -> tuple[str, str | None]:
     """Return the numeral of a cell and the unit behind it, in our spelling; None where none stands there.
 
     >>> parted("1,02 cm"), parted("949 mbar"), parted("50.1"), parted("12 furlong")
@@ -36,7 +36,7 @@ def with_any_unit(cell: str) -> tuple[str, str]:
     >>> with_any_unit("12.3 m³/h"), with_any_unit("949 mbar"), with_any_unit("Bad Input")
     (('12.3', 'm³/h'), ('949', 'mbar'), ('Bad Input', ''))
     """
-    numeral, unit = parted(cell)
+    numeral, unit = split_unit(cell)
     match = None if unit or is_numeral(cell) else _WITH_UNIT.fullmatch(cell)
     return (match[1], match[2]) if match and PROCESS_UNITS.fullmatch(match[2]) else (numeral, unit or "")
 

@@ -19,7 +19,7 @@ from workbench.imports.cell_kinds import may_be_clock
 from workbench.imports.column_names import rank_by_name
 from workbench.imports.header_search import ColumnMissing, Header, find_header, guess_header, matches, with_units
 from workbench.imports.raw_table import Cell, RawTable
-from workbench.imports.turned_tables import cells_at, table_of_signal, turned, value_places
+from workbench.imports.turned_tables import cells_at, table_of_signal, turn_table, value_places
 
 DISTINCT = 0.4
 """Part of a clock's times that differ: two rows of a second are so many."""
@@ -58,7 +58,7 @@ def _in_one_table(path: Path, tables: Sequence[RawTable], names: Sequence[str], 
     try:
         return find_header(path, tables, names, clock)
     except ColumnMissing:
-        lying = [each for table in tables if (each := turned(table))]
+        lying = [each for table in tables if (each := turn_table(table))]
         if not lying:
             raise
         return find_header(path, lying, names, clock)

@@ -57,14 +57,14 @@ class Group:
     table: int = 0
 
 
-def joined(path: Path, groups: Sequence[Group]) -> tuple[Column, dict[str, Column], dict[str, str]]:
+def join_clocks(path: Path, groups: Sequence[Group]) -> tuple[Column, dict[str, Column], dict[str, str]]:
     """Return the time of the stem's samples, s, from its clock's zero, the columns at it, and what was done.
 
     Raises:
         InputError: no time is common to all, or one clock tells the day and another does not.
     """
     base = next(each for each in groups if any(name.startswith(("position", "velocity")) for name in each.columns))
-    others = [_paired(each, base) for each in groups if each is not base]
+    others = [_pair_group(each, base) for each in groups if each is not base]
     if len({each.origin_s is None for each in (base, *others)}) > 1:
         told = next(each.named for each in groups if each.origin_s is not None)
         not_told = next(each.named for each in groups if each.origin_s is None)
@@ -103,7 +103,7 @@ def joined(path: Path, groups: Sequence[Group]) -> tuple[Column, dict[str, Colum
     return time_s[within], {name: column[within] for name, column in columns.items()}, notes
 
 
-def _paired(group: Group, base: Group) -> Group:
+def _pair_group(group: Group, base: Group) -> Group:
     """Return a group by the stem's clock where its own tells the same instants in other words."""
     own_s, stem_s = group.time_s, base.time_s
     if group.table != base.table or own_s.size != stem_s.size or own_s.size < FEWEST_CLOCK_ROWS:

@@ -15,7 +15,7 @@ import numpy as np
 
 from config.errors import InputError
 from config.recording import Column
-from workbench.imports.cell_kinds import numbers_of, parted
+from workbench.imports.cell_kinds import numbers_of, split_unit
 from workbench.imports.export_units import UNITS
 from workbench.imports.number_notation import is_numeral
 from workbench.imports.raw_table import Cell
@@ -115,7 +115,7 @@ def clock_of(
     """
     cells = samples.cells[theirs]
     first = next((cell for cell in cells if cell != ""), "")
-    worded = isinstance(first, str) and not is_numeral(first) and parted(first)[1] is None
+    worded = isinstance(first, str) and not is_numeral(first) and split_unit(first)[1] is None
     stamped = mapped == "iso" or (time_format is not None and isinstance(first, str)) or worded
     if stamped and all(isinstance(cell, str) for cell in cells):
         seconds, first_s, naive = seconds_of(path, [str(cell) for cell in cells], samples.lines, time_format)
@@ -152,5 +152,5 @@ def _in_header(samples: Samples, theirs: str) -> str | None:
 
 
 def _unit(cell: Cell) -> str | None:
-    unit = parted(cell)[1] if isinstance(cell, str) else None
+    unit = split_unit(cell)[1] if isinstance(cell, str) else None
     return unit if unit in UNITS["_s"] else None

@@ -6,7 +6,7 @@ from dataclasses import dataclass
 
 from config.errors import InputError
 from config.recording import BEHIND_POSITIONER, OF_DRIVES, REQUIRED
-from workbench.imports.export_units import SHARES, UNITS, allowed_units, ending_of
+from workbench.imports.export_units import SHARES, UNITS, ending_of, list_allowed_units
 
 RANGE_PA = (0.2e5, 1.0e5)
 """The pressures of 0 % and 100 % that are assumed, and told, where nobody says others: the field's 0.2 to 1 bar."""
@@ -83,7 +83,7 @@ def _source(word: str) -> Source:
         raise InputError("--column", f"{word!r}: must be OURS=THEIRS:UNIT, OURS ending in {endings} (position_m=PV:%)")
     name, theirs, unit = match[1], match[3], match[4]
     ending = ending_of(name)
-    allowed = allowed_units(ending)
+    allowed = list_allowed_units(ending)
     plain = (unit or "").removeprefix("-")
     turned = unit is not None and unit != plain
     if unit is not None and (plain not in allowed or (turned and not _can_be_turned(ending, plain))):
@@ -92,14 +92,14 @@ def _source(word: str) -> Source:
     return Source(name, theirs, unit)
 
 
-def offered_units(ours: str) -> list[str]:
+def list_units(ours: str) -> list[str]:
     """Return the units that a column of ours may be in, those from the other end too.
 
     >>> offered_units("position_m")[:3], offered_units("position_m")[-1]
     (['m', 'cm', 'mm'], '-2-10V')
     """
     ending = ending_of(ours)
-    allowed = allowed_units(ending)
+    allowed = list_allowed_units(ending)
     return [*allowed, *(f"-{unit}" for unit in allowed if _can_be_turned(ending, unit))]
 
 

@@ -47,7 +47,7 @@ def is_called(words: str, name: str) -> bool:
     """
     # Of a structure's field, log.t, the field's own name counts as well; the unit behind a name does not.
     plain = unit_in_header(name)[0]
-    names = (taken_apart(each) for each in (name, plain, plain.rpartition(".")[2]))
+    names = (split_words(each) for each in (name, plain, plain.rpartition(".")[2]))
     return any(re.search(words, each, re.IGNORECASE) for each in names)
 
 
@@ -56,7 +56,7 @@ def rank_by_name(ours: str, name: str) -> int | None:
     return next((rank for rank, words in enumerate(COMMON[ours]) if is_called(words, name)), None)
 
 
-def taken_apart(name: str) -> str:
+def split_words(name: str) -> str:
     """Return the words of a name.
 
     >>> taken_apart("stemPos_mm")

@@ -11,13 +11,13 @@ from itertools import islice
 from pathlib import Path
 
 from config.errors import InputError
-from workbench.imports.cell_kinds import parted, with_any_unit
+from workbench.imports.cell_kinds import split_unit, with_any_unit
 from workbench.imports.clock_groups import clock_places, signal_places
 from workbench.imports.column_names import STATUS, rank_by_name
 from workbench.imports.header_search import Header, guess_header
 from workbench.imports.number_notation import decimal_sign, is_numeral
 from workbench.imports.raw_table import Cell, RawTable
-from workbench.imports.turned_tables import signals_in, table_of_signal, turned
+from workbench.imports.turned_tables import signals_in, table_of_signal, turn_table
 
 LOOKED_AT = 200
 MOST_SHOWN = 5
@@ -56,7 +56,7 @@ class ColumnPreview:
     @property
     def units_behind(self) -> tuple[str, ...]:
         """The units that stand behind its numbers."""
-        behind = (parted(cell)[1] for cell in self.cells if isinstance(cell, str) and cell)
+        behind = (split_unit(cell)[1] for cell in self.cells if isinstance(cell, str) and cell)
         return tuple(dict.fromkeys(each for each in behind if each))
 
     @property
@@ -81,7 +81,7 @@ def shown(cell: Cell) -> str:
     return text if len(text) <= WIDEST else text[: WIDEST - 2] + ".."
 
 
-def shown_decimal(columns: Sequence[ColumnPreview], separator: str) -> tuple[str, str]:
+def find_decimal(columns: Sequence[ColumnPreview], separator: str) -> tuple[str, str]:
     """Return the decimal sign that some columns show, and what a person must say where they leave it open."""
     texts = [with_any_unit(cell)[0] for each in columns if each.numbers for cell in each.cells if isinstance(cell, str)]
     try:
@@ -90,13 +90,13 @@ def shown_decimal(columns: Sequence[ColumnPreview], separator: str) -> tuple[str
         return ".", error.problem
 
 
-def guessed(path: Path, tables: Sequence[RawTable]) -> Header:
+def likely_header(path: Path, tables: Sequence[RawTable]) -> Header:
     """Return the likeliest reading of a file; one that is turned before those that are not.
 
     Raises:
         InputError: it holds no table.
     """
-    lying = [each for table in tables if (each := turned(table))]
+    lying = [each for table in tables if (each := turn_table(table))]
     header = guess_header(lying) or guess_header(tables)
     if header is None:
         raise InputError(str(path), "holds no table: no two of its first lines have the same columns")

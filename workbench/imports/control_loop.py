@@ -21,7 +21,7 @@ from dataclasses import dataclass
 import numpy as np
 import numpy.typing as npt
 
-from workbench.imports.column_names import COMMON, PROCESS_VALUE, SETPOINT, is_called, rank_by_name, taken_apart
+from workbench.imports.column_names import COMMON, PROCESS_VALUE, SETPOINT, is_called, rank_by_name, split_words
 from workbench.imports.export_units import PROCESS_UNITS, SHARES, UNITS
 
 Array = npt.NDArray[np.float64]
@@ -129,7 +129,7 @@ def _role(column: LoopColumn) -> str | None:
 def _tag(name: str, role: str) -> str:
     """Return what is left of a name without the words for what it is."""
     words = {"setpoint": SETPOINT, "output": OUTPUT, "process_value": PROCESS_VALUE}[role]
-    left = re.sub(rf"(?:{words})\w*|\bvalue\b|[\[(<].*$", " ", taken_apart(name), flags=re.IGNORECASE)
+    left = re.sub(rf"(?:{words})\w*|\bvalue\b|[\[(<].*$", " ", split_words(name), flags=re.IGNORECASE)
     return " ".join(re.sub(rf"%|/|{PROCESS_UNITS.pattern}", " ", left, flags=re.IGNORECASE).split())
 
 

@@ -6,11 +6,18 @@ from pathlib import Path
 
 from config.results.block import Block, Table, as_text
 from workbench.imports.cell_kinds import numbers_of, with_any_unit
-from workbench.imports.column_preview import ColumnPreview, columns_of, columns_of_all, guessed, shown, shown_decimal
+from workbench.imports.column_preview import (
+    ColumnPreview,
+    columns_of,
+    columns_of_all,
+    find_decimal,
+    likely_header,
+    shown,
+)
 from workbench.imports.control_loop import LoopColumn, LoopColumns, loops_of
 from workbench.imports.file_kind import raw_tables
 from workbench.imports.header_search import SHOWN, Header
-from workbench.imports.proposal import is_clock, proposal, quoted
+from workbench.imports.proposal import is_clock, proposal, quote_word
 from workbench.imports.raw_table import RawTable
 
 FIRST_CELLS = 3
@@ -47,7 +54,7 @@ class ExportPreview:
             (each.name, each.unit or "", *(shown(cell) for cell in (*each.cells, "", "", "")[:FIRST_CELLS]))
             for each in self.columns
         ]
-        proposed = " ".join(map(quoted, self.words))
+        proposed = " ".join(map(quote_word, self.words))
         return [
             f"{self.what}; {self.header}",
             Table(("column", "unit", "first", "values", ""), rows),
@@ -63,7 +70,7 @@ def preview(path: Path, sheet: str | None = None) -> ExportPreview:
         InputError: it cannot be read or holds no table.
     """
     tables = raw_tables(path, sheet)
-    header = guessed(path, tables)
+    header = likely_header(path, tables)
     columns = columns_of(header)
     besides = _besides(header.table, tables)
     words, open_ = proposal(columns, header.table.separator)
@@ -72,7 +79,7 @@ def preview(path: Path, sheet: str | None = None) -> ExportPreview:
         wider = proposal(of_all, header.table.separator)
         if _reads(wider[0]):
             columns, (words, open_), besides = of_all, wider, []
-    decimal, is_open = shown_decimal(columns, header.table.separator)
+    decimal, is_open = find_decimal(columns, header.table.separator)
     signals = [each for each in columns if each.numbers and not is_clock(each)]
     told = (loops_of([_of_loop(each, sign) for each in signals]) for sign in (",." if is_open else decimal))
     loops = tuple(next(filter(None, told), ()))

@@ -112,7 +112,7 @@ _BY_ALIAS = {alias: unit for aliases, unit in _ALIASES.items() for alias in alia
 }
 
 
-def allowed_units(ending: str) -> list[str]:
+def list_allowed_units(ending: str) -> list[str]:
     """Return the units of a column of ours, by the ending of its name."""
     shares = list(SHARES) if ending in ("_pa", "_m") else []
     return [*UNITS[ending], *shares]

@@ -98,7 +98,7 @@ def _header_of(path: Path, table: RawTable, wanted: Sequence[str], clock: str | 
     above: Sequence[Cell] = ()  # of the line before: one that is blank parts a table from what is said of it
     for line, cells in islice(table.rows(), SEARCHED):
         written = tuple(map(str, cells))
-        names = told_apart(written, above)
+        names = distinguish_names(written, above)
         at = _places(path, f"{table.place} {line}", names, written, wanted, clock)
         if at is not None:
             return Header(table, line, names, at, line, as_written=written, clock=clock)
@@ -106,7 +106,7 @@ def _header_of(path: Path, table: RawTable, wanted: Sequence[str], clock: str | 
     return None
 
 
-def told_apart(names: Sequence[str], above: Sequence[Cell]) -> tuple[str, ...]:
+def distinguish_names(names: Sequence[str], above: Sequence[Cell]) -> tuple[str, ...]:
     """Return the names of a row; those that stand several times with what stands above their group before them.
 
     >>> told_apart(["Time", "Value", "Time", "Value"], ["FV1.OP", "", "FV1.ZT", ""])
@@ -257,7 +257,7 @@ def _guess(table: RawTable) -> tuple[tuple[bool, int, int], Header] | None:
     line, cells = _names(rows, width)
     named = _is_words(cells)
     written = tuple(map(str, cells))
-    names = told_apart(written, next((row for number, row in rows if number == line - 1), ()))
+    names = distinguish_names(written, next((row for number, row in rows if number == line - 1), ()))
     names = tuple(
         f"#{index + 1}" if not named or (name and name in names[:index]) else name for index, name in enumerate(names)
     )

@@ -16,14 +16,14 @@ import numpy as np
 from config.errors import InputError
 from config.recording import REQUIRED, Column, Recording
 from workbench.imports.clock_groups import find_groups
-from workbench.imports.clock_join import Group, joined
+from workbench.imports.clock_join import Group, join_clocks
 from workbench.imports.column_clock import Clock, clock_of
 from workbench.imports.column_mapping import RANGE_PA, ExportOptions, Source
 from workbench.imports.export_units import SHARES, UNITS
 from workbench.imports.file_kind import raw_tables
 from workbench.imports.number_notation import decimal_sign
 from workbench.imports.raw_table import Cell
-from workbench.imports.sample_rows import Progress, Samples, collected
+from workbench.imports.sample_rows import Progress, Samples, collect_samples
 from workbench.imports.time_order import in_order
 from workbench.imports.typed_columns import Scale, in_si, numerals, unit_of
 
@@ -63,7 +63,7 @@ def read_export(
         [each.theirs for each in values],
         [each.theirs for each in options.status],
     )
-    parts = [collected(path, header, clock.theirs if clock else None, tell) for header in headers]
+    parts = [collect_samples(path, header, clock.theirs if clock else None, tell) for header in headers]
     read = [[each for each in sources if each.theirs in part.cells] for part in parts]
     shown = [text for part, of_it in zip(parts, read, strict=True) for text in numerals(part, of_it)]
     decimal = options.decimal or decimal_sign(str(path), shown, headers[0].table.separator)
@@ -77,7 +77,9 @@ def read_export(
         groups.append(_group(path, part, of_it, units, decimal, scale, options, tell, metadata))
     said = ", ".join(f"{each.name} from {each.theirs} in {units.get(each.name, 's')}" for each in sources)
     metadata = {"imported": said} | _list_assumptions(units, range_pa) | metadata
-    (time_s, columns, notes) = (groups[0].time_s, groups[0].columns, {}) if len(groups) == 1 else joined(path, groups)
+    (time_s, columns, notes) = (
+        (groups[0].time_s, groups[0].columns, {}) if len(groups) == 1 else join_clocks(path, groups)
+    )
     named = {"time_s": time_s} | columns
     return Recording.of({name: named[name] for name in sorted(named, key=_contract_order)}, metadata | notes)
 

@@ -16,13 +16,13 @@ Ask = Callable[[str, str], str]
 NEEDED = ("position_m",)
 
 
-def answered(found: ExportPreview, ask: Ask) -> MappingTable:
+def ask_for_mapping(found: ExportPreview, ask: Ask) -> MappingTable:
     """Return the mapping that a file's proposal and a person's answers make.
 
     Raises:
         InputError: an answer that is none of those allowed; names the question.
     """
-    words = _proposed(found)
+    words = _propose_columns(found)
     asked = [ours if ours != "command_pa" or "reference_m" not in words else "reference_m" for ours in COMMON]
     columns = [word for ours in asked if (word := _column(ours, words.get(ours), found, ask))]
     timed = any(each.startswith("time_s=") for each in columns)
@@ -40,7 +40,7 @@ def answered(found: ExportPreview, ask: Ask) -> MappingTable:
     )
 
 
-def _proposed(found: ExportPreview) -> dict[str, str]:
+def _propose_columns(found: ExportPreview) -> dict[str, str]:
     """Return `THEIRS` or `THEIRS:UNIT` as proposed, by ours."""
     given = [word for flag, word in zip(found.words, found.words[1:], strict=False) if flag == "--column"]
     return {word.partition("=")[0]: word.partition("=")[2] for word in given}

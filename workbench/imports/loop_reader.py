@@ -23,7 +23,7 @@ from workbench.imports.file_kind import raw_tables
 from workbench.imports.number_notation import decimal_sign
 from workbench.imports.proposal import is_clock
 from workbench.imports.raw_table import Cell
-from workbench.imports.sample_rows import Samples, collected
+from workbench.imports.sample_rows import Samples, collect_samples
 from workbench.imports.time_order import in_order
 
 Array = npt.NDArray[np.float64]
@@ -77,11 +77,11 @@ def read_loop(
         InputError: the file cannot be read, no loop or several are recognised, or OP is no share; says what to type.
     """
     roles = dict(named or {})
-    loop = None if {"time", "op", "pv"} <= set(roles) else _recognised(path, roles)
+    loop = None if {"time", "op", "pv"} <= set(roles) else _recognise(path, roles)
     roles["time"], unit = _and_unit(roles["time"])
     wanted = [theirs for role, theirs in roles.items() if role != "time"]
     headers = find_groups(path, raw_tables(path), roles["time"], wanted)
-    parts = [collected(path, header, roles["time"], lambda _what, _done: None) for header in headers]
+    parts = [collect_samples(path, header, roles["time"], lambda _what, _done: None) for header in headers]
     texts = [
         cell
         for part in parts
@@ -91,7 +91,7 @@ def read_loop(
     ]
     decimal = decimal or decimal_sign(str(path), texts, headers[0].table.separator)
     read = [_of_one_clock(path, part, roles, unit, time_format, decimal) for part in parts]
-    time_s, columns = _laid_on_pv(path, read)
+    time_s, columns = _lay_on_pv(path, read)
     notes = {
         key: said for part, each in zip(parts, read, strict=True) for key, said in (part.notes | each.notes).items()
     }
@@ -161,7 +161,7 @@ def _require_one_unit(path: Path, theirs: str, cells: Sequence[Cell]) -> None:
         raise InputError(str(path), f"{theirs!r} is in {' and in '.join(units)}: export it with one unit, unformatted")
 
 
-def _laid_on_pv(path: Path, parts: Sequence[_OneClock]) -> tuple[Array, dict[str, Array]]:
+def _lay_on_pv(path: Path, parts: Sequence[_OneClock]) -> tuple[Array, dict[str, Array]]:
     """Return PV's time and all columns at it: OP on straight lines between its samples, SP and mode as last said.
 
     Raises:
@@ -180,7 +180,7 @@ def _laid_on_pv(path: Path, parts: Sequence[_OneClock]) -> tuple[Array, dict[str
     return base.time_s, columns
 
 
-def _recognised(path: Path, roles: dict[str, str]) -> LoopColumns | None:
+def _recognise(path: Path, roles: dict[str, str]) -> LoopColumns | None:
     """Fill in the roles that nobody named; return the loop they are of.
 
     Raises:

@@ -12,8 +12,8 @@ from typing import Any
 
 import numpy as np
 
-from config.extras import needed
-from workbench.imports.reader_process import Groups, damaged, read_apart, write_read
+from config.extras import import_extra
+from workbench.imports.reader_process import Groups, describe_damage, read_apart, write_read
 from workbench.imports.typed_tables import NUMBERS, Columns, first_line, vectors_of
 
 KIND = "MATLAB"
@@ -27,7 +27,7 @@ def matlab_columns(path: Path) -> Columns:
         ModuleNotFoundError: scipy is not installed; names the extra.
     """
     if find_spec("scipy") is None:
-        needed("scipy.io", str(path))
+        import_extra("scipy.io", str(path))
     ((_, columns),) = read_apart(path, "workbench.imports.matlab_reader", KIND)
     return columns
 
@@ -38,12 +38,12 @@ def _read(path: Path) -> Groups:
     Raises:
         InputError: as said above.
     """
-    io = needed("scipy.io", str(path))
+    io = import_extra("scipy.io", str(path))
     try:
         with warnings.catch_warnings(action="ignore"):
             found = io.loadmat(path, simplify_cells=True)
     except Exception as error:  # a damaged file fails anywhere in scipy's reader
-        raise damaged(path, KIND, first_line(error)) from None
+        raise describe_damage(path, KIND, first_line(error)) from None
     return [(KIND, dict(_vectors({name: value for name, value in found.items() if not name.startswith("__")})))]
 
 

@@ -12,9 +12,9 @@ from typing import Any
 import numpy as np
 
 from config.errors import InputError
-from config.extras import needed
+from config.extras import import_extra
 from config.plain_file import require_moderate
-from workbench.imports.reader_process import Groups, damaged, read_apart, write_read
+from workbench.imports.reader_process import Groups, describe_damage, read_apart, write_read
 from workbench.imports.typed_tables import NUMBERS, Columns, first_line, with_unit
 
 KIND = "MDF"
@@ -30,7 +30,7 @@ def mdf4_groups(path: Path) -> Groups:
         ModuleNotFoundError: asammdf is not installed; names the extra.
     """
     if find_spec("asammdf") is None:
-        needed("asammdf", str(path))
+        import_extra("asammdf", str(path))
     return read_apart(path, "workbench.imports.mdf4_reader", KIND)
 
 
@@ -40,7 +40,7 @@ def _read(path: Path) -> Groups:
     Raises:
         InputError: as said above.
     """
-    asammdf = needed("asammdf", str(path))
+    asammdf = import_extra("asammdf", str(path))
     try:
         with warnings.catch_warnings(action="ignore"), asammdf.MDF(path) as file:
             if not file.version.startswith("4"):
@@ -49,7 +49,7 @@ def _read(path: Path) -> Groups:
     except InputError:
         raise
     except Exception as error:  # a damaged file fails anywhere in its reader
-        raise damaged(path, KIND, first_line(error)) from None
+        raise describe_damage(path, KIND, first_line(error)) from None
 
 
 def _group(path: Path, file: Any, index: int) -> Columns:

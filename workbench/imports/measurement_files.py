@@ -19,7 +19,7 @@ from typing import Any
 import numpy as np
 
 from config.errors import InputError
-from config.extras import needed
+from config.extras import import_extra
 from config.plain_file import require_moderate
 from workbench.imports import pandas_store
 from workbench.imports.matlab_reader import matlab_columns
@@ -78,7 +78,7 @@ def hdf5(path: Path) -> list[RawTable]:
         InputError: it is damaged, or holds no vectors.
         ModuleNotFoundError: h5py is not installed; names the extra.
     """
-    h5py = needed("h5py", str(path))
+    h5py = import_extra("h5py", str(path))
     try:
         with h5py.File(path, "r") as file:
             columns = dict(_datasets(path, h5py, file))
@@ -139,7 +139,7 @@ def tdms(path: Path) -> list[RawTable]:
         InputError: it is damaged, or holds no channels of numbers.
         ModuleNotFoundError: nptdms is not installed; names the extra.
     """
-    nptdms = needed("nptdms", str(path))
+    nptdms = import_extra("nptdms", str(path))
     told = _Told()
     logging.getLogger("nptdms").handlers = [told]
     try:

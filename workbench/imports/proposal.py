@@ -20,10 +20,10 @@ from workbench.imports.cell_kinds import begins_number, may_be_clock, numbers_of
 from workbench.imports.column_clock import time_base
 from workbench.imports.column_mapping import RANGE_PA
 from workbench.imports.column_names import COMMON, COUNTER, SETPOINT, STATUS, is_called, rank_by_name
-from workbench.imports.column_preview import GOOD, ColumnPreview, shown_decimal
-from workbench.imports.export_units import SHARES, UNITS, allowed_units, ending_of, unit_named
+from workbench.imports.column_preview import GOOD, ColumnPreview, find_decimal
+from workbench.imports.export_units import SHARES, UNITS, ending_of, list_allowed_units, unit_named
 from workbench.imports.raw_table import Cell
-from workbench.imports.time_stamps import proposed_formats, seconds_of
+from workbench.imports.time_stamps import propose_formats, seconds_of
 
 Array = npt.NDArray[np.float64]
 STAMP = r"\d{4}-\d\d-\d\d"
@@ -40,7 +40,7 @@ def proposal(columns: Sequence[ColumnPreview], separator: str) -> tuple[tuple[st
     words: list[str] = []
     open_: list[str] = []
     left = list(columns)
-    decimal, sign_open = shown_decimal(columns, separator)
+    decimal, sign_open = find_decimal(columns, separator)
     of_drive = _of_drive(columns)
     for ours in ("time_s", *of_drive) if of_drive else COMMON:
         chosen = of_drive.get(ours) or (_clock(left) if ours == "time_s" else _likeliest(ours, left))
@@ -118,7 +118,7 @@ def _span_s(clock: ColumnPreview) -> float:
             base = time_base(values)
             return abs(float(values[-1] - values[0])) * UNITS["_s"][base.unit if base else clock.unit or "s"]
     texts = [str(cell) for cell in cells]
-    formats = [None] if all(re.match(STAMP, text) for text in texts) else proposed_formats(texts)
+    formats = [None] if all(re.match(STAMP, text) for text in texts) else propose_formats(texts)
     if not formats:
         return inf
     try:
@@ -165,7 +165,7 @@ def _doubts(left: Sequence[ColumnPreview]) -> Iterator[str]:
     for each in left:
         if held := each.status_words:
             (often, _), *_ = Counter(cell for cell in each.cells if cell != "").most_common()
-            keeps = f"--status {quoted(f'{each.name}={often}')} keeps the rows of that word alone"
+            keeps = f"--status {quote_word(f'{each.name}={often}')} keeps the rows of that word alone"
             yield f"{each.name!r} holds {held}: {keeps}, if it is the good one"
         if held := each.opc_qualities:
             yield f"{each.name!r} holds {held}: of OPC's qualities {GOOD} is good, the rows of it alone are kept"
@@ -208,7 +208,7 @@ def _rank(ours: str, column: ColumnPreview) -> int | None:
     if (
         is_clock(column)
         or not column.numbers
-        or not (column.unit is None or column.unit in allowed_units(ending_of(ours)))
+        or not (column.unit is None or column.unit in list_allowed_units(ending_of(ours)))
     ):
         return None
     # The set point of a position is none, unless there is no other.
@@ -268,14 +268,14 @@ def _at_the_end(ours: str, name: str) -> str | None:
     *before, ending = re.split(r"[_.\s]+", name)
     unit = unit_named(ending) if before else None
     # `p_in` is an input, and no inch.
-    return unit if unit in allowed_units(ending_of(ours)) and unit != "in" else None
+    return unit if unit in list_allowed_units(ending_of(ours)) and unit != "in" else None
 
 
 def _time_words(column: ColumnPreview, open_: list[str]) -> list[str]:
     texts = [str(cell) for cell in column.cells if cell != "" and begins_number(cell)]
     if not texts or all(re.match(STAMP, text) for text in texts):
         return []
-    formats = proposed_formats(texts)
+    formats = propose_formats(texts)
     if not formats:
         open_.append(f"how {texts[0]!r} is to be read is open: --time-format")
         return []
@@ -284,7 +284,7 @@ def _time_words(column: ColumnPreview, open_: list[str]) -> list[str]:
     return ["--time-format", formats[0]]
 
 
-def quoted(word: str) -> str:
+def quote_word(word: str) -> str:
     """Return a word as it is typed in a shell."""
     plain = " ".join(word.split())
     if re.fullmatch(r"[\w=:.%+/@,#-]+", plain):

@@ -65,7 +65,7 @@ def read_apart(path: Path, module: str, kind: str) -> Groups:
         if ended.returncode == REFUSED:
             raise InputError(str(path), ended.stderr.strip().rpartition("\n")[2])
         if ended.returncode:
-            raise damaged(path, kind, f"its reader breaks down, status {ended.returncode}")
+            raise describe_damage(path, kind, f"its reader breaks down, status {ended.returncode}")
         with np.load(into) as read:
             names, *arrays = (read[each] for each in read.files)
     each = iter(arrays)
@@ -87,9 +87,9 @@ def write_read(read: Callable[[Path], Groups], path: str, into: str, limit_s: st
 
 
 def _endless(path: Path, kind: str, limit_s: float) -> InputError:
-    return damaged(path, kind, f"its reader comes to no end in {limit_s:.0f} s")
+    return describe_damage(path, kind, f"its reader comes to no end in {limit_s:.0f} s")
 
 
-def damaged(path: Path, kind: str, why: str) -> InputError:
+def describe_damage(path: Path, kind: str, why: str) -> InputError:
     """Return what to say of a damaged file."""
     return InputError(str(path), f"is a damaged {kind} file: {why}")

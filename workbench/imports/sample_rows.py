@@ -35,7 +35,7 @@ class Samples:
         return Samples(self.header, cells, array("q", (self.lines[row] for row in rows)), self.notes)
 
 
-def collected(path: Path, header: Header, clock: str | None, tell: Progress) -> Samples:
+def collect_samples(path: Path, header: Header, clock: str | None, tell: Progress) -> Samples:
     """Return the samples under a header, by a clock's column where there is one.
 
     Raises:

@@ -46,7 +46,7 @@ def text_tables(path: Path) -> list[RawTable]:
     Raises:
         InputError: it is no text, or empty.
     """
-    text, encoding = decoded(path)
+    text, encoding = decode_text(path)
     if not text.strip():
         raise InputError(str(path), "holds no samples: it is empty")
     for begin, problem in NO_TABLES.items():
@@ -112,7 +112,7 @@ def _without_annotations(text: str) -> str:
     return "".join("\n" if each.startswith(ANNOTATIONS) else each for each in lines)
 
 
-def decoded(path: Path) -> tuple[str, str]:
+def decode_text(path: Path) -> tuple[str, str]:
     """Return the text of a file and its encoding.
 
     Raises:

@@ -122,14 +122,14 @@ def _unreadable(path: Path, texts: Sequence[str], row: int, line: int, time_form
     said = f"sample {row + 1}: {texts[row]!r} is neither seconds nor an ISO time stamp (2026-01-31T12:00:00.5)"
     if time_format is not None:
         said = f"sample {row + 1} (line {line}): {texts[row]!r} is not as --time-format {time_format!r} says"
-    if proposed := proposed_formats(texts[:TRIED_ROWS]):
+    if proposed := propose_formats(texts[:TRIED_ROWS]):
         said += "; it can be read with " + ", or ".join(f'--time-format "{each}"' for each in proposed)
     elif time_format is None:
         said += '; say how it is written, as in --time-format "%d.%m.%Y %H:%M:%S"'
     return InputError(str(path), said)
 
 
-def proposed_formats(texts: Sequence[str]) -> list[str]:
+def propose_formats(texts: Sequence[str]) -> list[str]:
     """Return the formats that read all of some stamps, but for those that say the same, or make a midnight a month.
 
     >>> proposed_formats(["01/02/2026 12:00:00"]), proposed_formats(["31/01/2026 12:00:00"])

@@ -14,7 +14,7 @@ from functools import partial
 from itertools import islice, zip_longest
 
 from config.errors import InputError
-from workbench.imports.cell_kinds import begins_number, parted
+from workbench.imports.cell_kinds import begins_number, split_unit
 from workbench.imports.column_names import COUNTER, STATUS, is_called, rank_by_name
 from workbench.imports.export_units import unit_named
 from workbench.imports.header_search import Header, guess_header
@@ -32,7 +32,7 @@ UNIT = r"^(unit|einheit|unit[ée]s?|unidad|unit[àa]|uom|eu|engineering units?|j
 VALUE = r"value|wert|valeur|valor|warto"
 
 
-def turned(table: RawTable) -> RawTable | None:
+def turn_table(table: RawTable) -> RawTable | None:
     """Return a table with a row a signal, turned; None if it is none."""
     try:
         rows = [
@@ -131,7 +131,7 @@ def value_places(header: Header, rows: Sequence[Sequence[Cell]]) -> list[int]:
     found = []
     for index, name in enumerate(header.names):
         cells = [cell for cell in cells_at(rows, index) if cell != ""]
-        numbers = sum(isinstance(cell, float) or is_numeral(parted(cell)[0]) for cell in cells)
+        numbers = sum(isinstance(cell, float) or is_numeral(split_unit(cell)[0]) for cell in cells)
         other = STATUS.search(name) or COUNTER.search(name) or rank_by_name("time_s", name) is not None
         if cells and 2 * numbers > len(cells) and not other:
             found.append(index)

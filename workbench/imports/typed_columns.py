@@ -14,9 +14,9 @@ import numpy as np
 
 from config.errors import InputError
 from config.recording import REQUIRED, Column
-from workbench.imports.cell_kinds import begins_number, parted
+from workbench.imports.cell_kinds import begins_number, split_unit
 from workbench.imports.column_mapping import Source
-from workbench.imports.export_units import ABSOLUTE, ATMOSPHERE_PA, SHARES, SI, UNITS, allowed_units, ending_of
+from workbench.imports.export_units import ABSOLUTE, ATMOSPHERE_PA, SHARES, SI, UNITS, ending_of, list_allowed_units
 from workbench.imports.number_notation import is_numeral, number
 from workbench.imports.sample_rows import Samples
 
@@ -29,7 +29,7 @@ def numerals(samples: Samples, sources: Sequence[Source]) -> Iterator[str]:
     for source in sources:
         for cell in samples.cells[source.theirs]:
             if isinstance(cell, str):
-                yield cell if is_numeral(cell) else numeral if (numeral := parted(cell)[0]) != cell else ""
+                yield cell if is_numeral(cell) else numeral if (numeral := split_unit(cell)[0]) != cell else ""
 
 
 def unit_of(path: Path, source: Source, samples: Samples) -> str:
@@ -45,11 +45,11 @@ def unit_of(path: Path, source: Source, samples: Samples) -> str:
     )
     mapped = (source.unit or "").removeprefix("-")
     for unit, line in said.items():
-        if unit not in allowed_units(ending):
+        if unit not in list_allowed_units(ending):
             raise InputError(
                 str(path),
                 f"column {source.theirs!r} is in {unit} by {header.table.place} {line}, and {source.name} takes "
-                f"{', '.join(allowed_units(ending))}: is it another column?",
+                f"{', '.join(list_allowed_units(ending))}: is it another column?",
             )
     if said:
         unit, line = next(iter(said.items()))
@@ -66,7 +66,7 @@ def unit_of(path: Path, source: Source, samples: Samples) -> str:
             raise InputError(
                 str(path),
                 f"column {source.theirs!r} has {unknown!r} where its unit stands, which is none that is known: "
-                f"type --column {source.name}={source.theirs}:UNIT, of {', '.join(allowed_units(ending))}",
+                f"type --column {source.name}={source.theirs}:UNIT, of {', '.join(list_allowed_units(ending))}",
             )
         samples.notes[f"unit of {source.theirs}, not known"] = unknown
     return source.unit or SI[ending]
@@ -77,7 +77,7 @@ def _behind_numbers(samples: Samples, source: Source) -> dict[str, int]:
     found: dict[str, int] = {}
     for cell, line in zip(samples.cells[source.theirs], samples.lines, strict=True):
         if isinstance(cell, str) and cell and begins_number(cell):
-            if unit := parted(cell)[1]:
+            if unit := split_unit(cell)[1]:
                 found.setdefault(unit, line)
             elif not found:  # the first number decides whether units stand behind them at all
                 break
@@ -133,7 +133,7 @@ def _numbers(path: Path, samples: Samples, source: Source, decimal: str) -> tupl
             continue
         value = number(cell, decimal)
         if value is None or (isnan(value) and begins_number(cell)):
-            numeral, units[row] = parted(cell)
+            numeral, units[row] = split_unit(cell)
             value = number(numeral, decimal) if units[row] else value
         if value is None:
             other = "," if decimal == "." else "."

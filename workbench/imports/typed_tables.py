@@ -11,7 +11,7 @@ from typing import Any
 import numpy as np
 
 from config.errors import InputError
-from config.extras import needed
+from config.extras import import_extra
 from config.plain_file import require_moderate
 from workbench.imports.raw_table import Cell, RawTable
 
@@ -37,7 +37,7 @@ def workbook(path: Path, sheet: str | None = None) -> list[RawTable]:
         raise InputError(str(path), f"is a damaged workbook: {first_line(error)}") from None
     if "xl/workbook.xml" not in names:
         raise InputError(str(path), "is an archive and no Excel workbook: unpack it, or save it as .xlsx or CSV")
-    openpyxl = needed("openpyxl", str(path))
+    openpyxl = import_extra("openpyxl", str(path))
     try:
         with warnings.catch_warnings(action="ignore"):
             book = openpyxl.load_workbook(path, read_only=True, data_only=True)
@@ -100,7 +100,7 @@ def parquet(path: Path) -> list[RawTable]:
         InputError: it is damaged.
         ModuleNotFoundError: pyarrow is not installed; names the extra.
     """
-    reader = needed("pyarrow.parquet", str(path))
+    reader = import_extra("pyarrow.parquet", str(path))
     try:
         declared = reader.read_metadata(path)
         require_moderate(path, declared.num_rows, declared.num_columns)

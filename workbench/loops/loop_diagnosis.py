@@ -6,7 +6,7 @@ from typing import TYPE_CHECKING, Any, Literal
 
 import numpy as np
 
-from config.extras import needed
+from config.extras import import_extra
 from config.results.block import Block, Table
 from config.results.result import Result
 from workbench.loops.calibration import CALIBRATION, Evidence, Witness
@@ -179,7 +179,7 @@ class LoopDiagnosis(Result):
 
     def plot(self) -> "Figure":
         """Return OP and PV over time, and PV over OP."""
-        pyplot = needed("matplotlib.pyplot", "plot")
+        pyplot = import_extra("matplotlib.pyplot", "plot")
         columns = self.frame_columns()
         figure, (over_time, over_output) = pyplot.subplots(1, 2, figsize=(11, 3.6), width_ratios=(2.2, 1))
         over_time.plot(columns["time_s"], columns["op_pct"])

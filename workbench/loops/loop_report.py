@@ -20,7 +20,7 @@ from workbench.report.page import (
     Html,
     Row,
     figures_of_merit,
-    folded,
+    fold_parts,
     glossary,
     heading_alone,
     pair,
@@ -31,7 +31,7 @@ from workbench.report.page import (
     verdict,
     write,
 )
-from workbench.report.plot_series import drawn, significant
+from workbench.report.plot_series import draw_series, significant
 from workbench.report.units import Shown
 
 KIND = {"sticks": "bad", "something else": "good", "cannot be told": "open"}
@@ -85,7 +85,7 @@ def report_loops(plant: Plant, path: Path, manifest: str) -> None:
     for count, each in enumerate(plant.ranked[:MOST_DRILLED]):
         name = f"loop-{count}"
         inside = [_verdict(each, name), *_pictures(each, name, FEWER), _causes(each, name), _votes(each, name)]
-        parts.append(folded(name, f"{count + 1}. {each.record.name}: {each.verdict}", *inside))
+        parts.append(fold_parts(name, f"{count + 1}. {each.record.name}: {each.verdict}", *inside))
     if plant.unreadable:
         rows = [Row(each) for each in plant.unreadable]
         parts.append(section("unreadable", "Unreadable", table("bad", ("Loop", "Why"), rows, (0, 1))))
@@ -223,5 +223,5 @@ def _amplitudes(values: Array, period_s: float) -> tuple[Array, Array]:
 
 
 def _line(time_s: Array, value: Array, name: str, colour: str, hover: str, most: int, **changes: Any) -> dict[str, Any]:
-    shown = drawn(time_s, value, most)
+    shown = draw_series(time_s, value, most)
     return line(significant(shown.time_s, 7), significant(shown.value), name, colour, hover, **changes)

@@ -136,7 +136,7 @@ class Limits:
     budget_s: float = inf
 
 
-def diagnosed(
+def run_diagnosis(
     tell: Tell, recording: Recording, valve: ValveFile, limits: Limits, effects: Sequence[str] | None
 ) -> Diagnosis:
     """Diagnose.
@@ -168,7 +168,7 @@ def diagnosed(
         raise CommandFailed("the time was over before the valve as it is was fitted: nothing is known") from None
 
 
-def extended(
+def run_extension(
     tell: Tell,
     recording: Recording,
     valve: ValveFile,
@@ -190,13 +190,13 @@ def extended(
         InputError: as `extend`.
     """
 
-    def progressed(what: str, done: float) -> None:
+    def tell_progress(what: str, done: float) -> None:
         tell(Progressed(what, done))
 
-    return extend(recording, valve, effects, test=limits.test, diagnosis=diagnosis, progress=progressed)
+    return extend(recording, valve, effects, test=limits.test, diagnosis=diagnosis, progress=tell_progress)
 
 
-def discovered(tell: Tell, recording: Recording, valve: ValveFile, limits: Limits) -> Discovery:
+def run_discovery(tell: Tell, recording: Recording, valve: ValveFile, limits: Limits) -> Discovery:
     """Look for the form of what no effect of the library explains.
 
     Args:

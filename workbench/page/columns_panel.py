@@ -11,10 +11,10 @@ from webpage.figure_view import Figure, FigureView
 from webpage.number_field import NumberField
 from webpage.telling import aside, heading, sentences
 from webpage.theme import Theme
-from workbench.imports.column_mapping import RANGE_PA, offered_units
+from workbench.imports.column_mapping import RANGE_PA, list_units
 from workbench.page.desk import Desk
 from workbench.page.export_figure import export_figure
-from workbench.page.opening import OURS, ColumnChoice, Export, Opened, mapped, parted, wrong_with
+from workbench.page.opening import OURS, ColumnChoice, Export, Opened, map_export, split_column, wrong_with
 
 NONE, AS_SAID = "", ""
 WORDS = {
@@ -69,11 +69,11 @@ class ColumnsPanel:
         ui.timer(0.0, self._show, once=True)
 
     def _column(self, ours: str) -> tuple[ui.select, ui.select]:
-        name, unit = parted(ours, self._export.proposed.columns[ours])
+        name, unit = split_column(ours, self._export.proposed.columns[ours])
         names = [each.name for each in self._export.preview.columns]
         columns = dict.fromkeys([*names, name]) | {NONE: "not there"}
         columns = {key: text or key for key, text in columns.items()}
-        units = {AS_SAID: "as it says, or SI"} | {each: each for each in offered_units(ours)}
+        units = {AS_SAID: "as it says, or SI"} | {each: each for each in list_units(ours)}
         with ui.row().classes("w-full no-wrap items-end").style("gap: 8px"):
             column = ui.select(columns, value=name, label=WORDS[ours], on_change=self._show, with_input=False)
             column.props(f'dense data-testid="column-{ours}"').style("flex: 3 1 0; min-width: 0")
@@ -123,7 +123,7 @@ class ColumnsPanel:
         self._confirm.set_enabled(False)
         try:
             choice = self._choice()
-            read = await aside(mapped, self._export, choice)
+            read = await aside(map_export, self._export, choice)
             said = await aside(wrong_with, read, choice.stroke_m)
         except InputError as error:
             asked = ASKED.get(error.source, self._export.name)

@@ -33,10 +33,10 @@ from workbench.page.background import (
     Limits,
     Task,
     Work,
-    diagnosed,
-    discovered,
     effect_checked,
-    extended,
+    run_diagnosis,
+    run_discovery,
+    run_extension,
 )
 from workbench.page.live_model import LiveModel
 from workbench.page.opening import Export, Opened
@@ -132,11 +132,11 @@ class Desk:
         """What errors of a position are of, in the unit that was chosen."""
         unit = self.units.length_unit()
 
-        def shown(value_m: float | None) -> Shown:
+        def show_length(value_m: float | None) -> Shown:
             text = NO_NUMBER if value_m is None else unit.fine_number(value_m)
             return Shown(text, "" if value_m is None else f"{value_m:.6g} m")
 
-        return Quantity(shown, unit.per_si, unit.name, "m")
+        return Quantity(show_length, unit.per_si, unit.name, "m")
 
     def take_recording(self, opened: Opened) -> None:
         """Put a recording on the desk.
@@ -195,7 +195,7 @@ class Desk:
         if not folder.exists():
             seal(folder, hide(seed))
         opened = Opened.of(f"{folder.name}/fit.csv", folder / "fit.csv", Recording.read(folder / "fit.csv"), seed=seed)
-        known = named_valve(str(folder / "valve.toml"), f"{folder.name}/valve.toml")
+        known = name_valve(str(folder / "valve.toml"), f"{folder.name}/valve.toml")
         self._hold_together(opened, replace(known, made=Hidden(seed)))
         self.export, self.held_out, self.sealed = None, None, folder
 
@@ -284,7 +284,7 @@ class Desk:
         Raises:
             InputError: as `begin`.
         """
-        self.begin("diagnose", diagnosed, tuple(effects)).tried = tuple(effects)
+        self.begin("diagnose", run_diagnosis, tuple(effects)).tried = tuple(effects)
 
     def extend(self, effects: Sequence[str]) -> None:
         """Begin to add effects, or to refit the valve as it is; a diagnosis of what lies here is gone on from.
@@ -293,7 +293,7 @@ class Desk:
             InputError: as `begin`.
         """
         found = self.diagnosed if effects else None
-        search = self.begin("extend", extended, tuple(effects), found and found.result)
+        search = self.begin("extend", run_extension, tuple(effects), found and found.result)
         search.went_on = Diagnosed(found.tried, is_verdict=False) if found else None
 
     def discover(self) -> None:
@@ -302,7 +302,7 @@ class Desk:
         Raises:
             InputError: as `begin`.
         """
-        self.begin("discover", discovered)
+        self.begin("discover", run_discovery)
 
     def extend_by_form(self, search: Search) -> None:
         """Begin to add the form that a search has found, as an effect of one's own.
@@ -313,7 +313,7 @@ class Desk:
         name = f"found_{sum(each.startswith('found_') for each in self.effects) + 1}"
         path = self.write_effect(name, search.result.found[0].text(search.recording.name))
         self.keep_effect(name)
-        self.begin("extend", extended, (str(path),), None).form = f"{name}.py"
+        self.begin("extend", run_extension, (str(path),), None).form = f"{name}.py"
 
     def take(self, search: Search) -> None:
         """Go on with what a search has come to: a diagnosis is kept, a refitted valve is the next; a form is shown.
@@ -448,7 +448,7 @@ def _same(one: Recording, other: Recording) -> bool:
     return same_names and all(np.array_equal(each, other.columns[name], True) for name, each in one.columns.items())
 
 
-def named_valve(text: str, name: str = "") -> NamedValve:
+def name_valve(text: str, name: str = "") -> NamedValve:
     """Return the valve that a person named: a path, or a shipped one's name.
 
     Raises:

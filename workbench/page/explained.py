@@ -31,10 +31,10 @@ ADDING_CELL = f"""<q-td :props="props"><q-btn flat dense no-caps icon="add" colo
 
 def word(text: str, key: str = "") -> None:
     """Show a word that explains itself; `key`: of `WORDS`, the word itself where nothing is said."""
-    explained(text, WORDS[key or text])
+    explain_text(text, WORDS[key or text])
 
 
-def explained(text: str, meaning: str) -> None:
+def explain_text(text: str, meaning: str) -> None:
     """Show a text whose meaning shows when it is pressed."""
     button = ui.element("button").classes("jump quiet").props(f'type="button" aria-label="what {text} means"')
     with button, ui.element("span"):

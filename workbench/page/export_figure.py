@@ -4,7 +4,7 @@ from config.recording import Column, Recording
 from webpage.ink import Ink
 from webpage.units import Unit, Units
 from workbench.report.charts import Figure, axis, layout
-from workbench.report.plot_series import extremes, rounded, running_s
+from workbench.report.plot_series import extremes, round_values, running_s
 
 MOST_DRAWN_POINTS = 900  # more than a screen has columns
 
@@ -35,6 +35,6 @@ def _line(along_s: Column, values: Column, told: tuple[str, Unit, str], colour: 
     rows = extremes(values, MOST_DRAWN_POINTS)
     return {
         "type": "scatter", "mode": "lines", "name": name, "yaxis": y_axis, "line": {"color": colour, "width": 1.3},
-        "x": rounded(along_s[rows], 4), "y": rounded(unit.per_si * values[rows], 5),
+        "x": round_values(along_s[rows], 4), "y": round_values(unit.per_si * values[rows], 5),
         "hovertemplate": f"%{{y:.4~g}} {unit.name} at %{{x:.3f}} s<extra>{name}</extra>",
     }  # fmt: skip

@@ -15,7 +15,7 @@ from webpage.units import Unit
 from workbench.compare.friction_balance import Forces
 from workbench.page.time_figure import Window
 from workbench.report.charts import Figure, axis, layout
-from workbench.report.plot_series import rounded
+from workbench.report.plot_series import round_values
 
 TIME_PLACES = 4  # digits after the point
 MOST_CLOUD_POINTS = 700
@@ -72,8 +72,8 @@ def _cloud(
     x: Column = getattr(cloud, field)
     return {
         "type": "scatter", "mode": "markers", "name": name,
-        "x": rounded(per_si * x[rows], 4), "y": rounded(cloud.friction_n[rows], 2),
-        "customdata": rounded(cloud.time_s[rows] - begin_s, TIME_PLACES),
+        "x": round_values(per_si * x[rows], 4), "y": round_values(cloud.friction_n[rows], 2),
+        "customdata": round_values(cloud.time_s[rows] - begin_s, TIME_PLACES),
         "marker": marker,
         "hovertemplate": "%{y:.4~g} N at %{x:.4~g}, %{customdata:.3f} s<extra>" + name + "</extra>",
     }  # fmt: skip

@@ -16,8 +16,8 @@ from webpage.number_field import NumberField
 from webpage.telling import aside, errors_told, heading, sentences
 from webpage.theme import Theme
 from workbench.page.columns_panel import ColumnsPanel
-from workbench.page.desk import Desk, named_valve
-from workbench.page.opening import Export, Opened, opened, opened_like, wrong_with
+from workbench.page.desk import Desk, name_valve
+from workbench.page.opening import Export, Opened, open_file_like, opened, wrong_with
 from workbench.page.provenance import DataSheetMade, NamedValve
 
 SUFFIXES = (".csv", ".txt", ".parquet", ".xlsx", ".mat")
@@ -104,7 +104,7 @@ class OpenPanel:
         path = await self._keep_file(event)
         event.sender.run_method("reset")
         with errors_told({str(path): event.file.name, "recording": event.file.name}):
-            await self._hold_out(await aside(opened_like, path, event.file.name, self._desk.opened))
+            await self._hold_out(await aside(open_file_like, path, event.file.name, self._desk.opened))
 
     async def _hold_out(self, held: Opened | None) -> None:
         await aside(self._desk.hold_out, held)
@@ -128,7 +128,7 @@ class OpenPanel:
         ratio = NumberField("break-away over sliding friction", 1.3)
         told = ui.column()
 
-        async def made() -> None:
+        async def make_valve() -> None:
             with errors_told():
                 area_cm2, low_bar, high_bar, stroke_mm = (each.number() for each in (area, low, high, stroke))
                 if area_cm2 is None or low_bar is None or high_bar is None or stroke_mm is None:
@@ -145,7 +145,7 @@ class OpenPanel:
 
         for each in (area, low, high, stroke, friction, ratio):
             each.classes("w-full").props("dense")
-        ui.button("Make the valve", on_click=made).props("outline no-caps")
+        ui.button("Make the valve", on_click=make_valve).props("outline no-caps")
 
     async def _handle_drop(self, event: events.UploadEventArguments) -> None:
         path = await self._keep_file(event)
@@ -187,7 +187,7 @@ class OpenPanel:
         self._show_name(self._desk.valve.name if self._desk.valve else None)
 
     async def _take_valve(self, text: str, name: str = "") -> None:
-        await aside(self._desk.take_valve, named_valve(text, name))
+        await aside(self._desk.take_valve, name_valve(text, name))
         self._changed()
 
     async def _blind(self) -> None:

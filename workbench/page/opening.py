@@ -8,9 +8,9 @@ from typing import Self
 from config.errors import InputError
 from config.plausibility import oddities
 from config.recording import Recording
-from workbench.compare.comparison_sentences import shortened
+from workbench.compare.comparison_sentences import shorten_notes
 from workbench.data.record import Record, ready, require_few_samples
-from workbench.imports.column_mapping import RANGE_PA, ExportOptions, offered_units, read_mapping, read_status
+from workbench.imports.column_mapping import RANGE_PA, ExportOptions, list_units, read_mapping, read_status
 from workbench.imports.export_preview import ExportPreview, preview
 from workbench.imports.export_units import SHARES
 from workbench.imports.historian_export import read_export
@@ -44,7 +44,7 @@ class ColumnChoice:
     @property
     def pressures(self) -> list[str]:
         """The pressures, of ours, that are given as a share of a range."""
-        units = {ours: parted(ours, theirs)[1].removeprefix("-") for ours, theirs in self.columns.items()}
+        units = {ours: split_column(ours, theirs)[1].removeprefix("-") for ours, theirs in self.columns.items()}
         return [ours for ours, unit in units.items() if ours.endswith("_pa") and unit in SHARES]
 
     @property
@@ -105,14 +105,14 @@ class Opened:
         return self.choice.words if self.choice else ()
 
 
-def parted(ours: str, theirs: str) -> tuple[str, str]:
+def split_column(ours: str, theirs: str) -> tuple[str, str]:
     """Return the name and the unit of a column as `NAME:UNIT` says it; the unit is empty where it says none.
 
     >>> parted("position_m", "FIC:101.PV:%"), parted("time_s", "FIC:101")
     (('FIC:101.PV', '%'), ('FIC:101', ''))
     """
     name, _, unit = theirs.rpartition(":")
-    return (name, unit) if name and unit in offered_units(ours) else (theirs, "")
+    return (name, unit) if name and unit in list_units(ours) else (theirs, "")
 
 
 @dataclass(frozen=True, slots=True)
@@ -151,7 +151,7 @@ def _read_proposal(found: ExportPreview) -> ColumnChoice:
     return ColumnChoice(columns, None, time_format, status=tuple(status))
 
 
-def opened_like(path: Path, name: str, first: Opened) -> Opened:
+def open_file_like(path: Path, name: str, first: Opened) -> Opened:
     """Read another recording of the same valve, an export as the first was read.
 
     Raises:
@@ -162,10 +162,10 @@ def opened_like(path: Path, name: str, first: Opened) -> Opened:
         return found
     if first.choice is None:
         raise InputError(name, "is another program's file, and the recording on the desk is not: their columns differ")
-    return mapped(found, first.choice)
+    return map_export(found, first.choice)
 
 
-def mapped(export: Export, by: ColumnChoice) -> Opened:
+def map_export(export: Export, by: ColumnChoice) -> Opened:
     """Read an export as a person says.
 
     Raises:
@@ -179,4 +179,4 @@ def mapped(export: Export, by: ColumnChoice) -> Opened:
 
 def wrong_with(opened: Opened, stroke_m: float | None) -> tuple[str, ...]:
     """Say what is wrong with a recording, a line each: what is odd, what was assumed, and what was left out or cut."""
-    return (*oddities(opened.recording, stroke_m), *shortened(opened.record.notes))
+    return (*oddities(opened.recording, stroke_m), *shorten_notes(opened.record.notes))

@@ -10,7 +10,7 @@ from webpage.telling import aside, errors_told, heading, look_at
 from webpage.theme import Theme
 from webpage.unit_choice import unit_choice
 from workbench.page.compare_panel import ComparePanel
-from workbench.page.desk import Desk, named_valve
+from workbench.page.desk import Desk, name_valve
 from workbench.page.journal_panel import JournalPanel
 from workbench.page.open_panel import OpenPanel, files_of
 from workbench.page.opening import Opened, opened
@@ -45,7 +45,7 @@ class Workbench:
         if tab not in self._desks:
             desk = self._desks[tab] = Desk(may_write_effects=self._only_here)
             if self._valve is not None:
-                desk.take_valve(named_valve(self._valve))
+                desk.take_valve(name_valve(self._valve))
             if len(self._files) == 1:
                 found = opened(self._files[0], str(self._files[0]))
                 if isinstance(found, Opened):
@@ -150,6 +150,6 @@ def serve_workbench(recordings: Sequence[Path], valve: str | None, where: Listen
     """
     workbench = Workbench(files_of(recordings), valve, only_here=where.is_own)
     if valve is not None:
-        named_valve(valve)
+        name_valve(valve)
     app.on_shutdown(workbench.clear)
     serve(TITLE, workbench.page, where, opens_browser=opens_browser)

@@ -18,8 +18,8 @@ from workbench.page.desk import Desk
 from workbench.page.effect_panel import effect_section
 from workbench.page.explained import ADDING_CELL, EFFECT_CELL, about_effect, word
 from workbench.page.search import Search
-from workbench.report.charts import EXTENDED, MEASURED, axis, layout, marked
-from workbench.report.diagnosis_report import ranked
+from workbench.report.charts import EXTENDED, MEASURED, axis, layout, mark_line
+from workbench.report.diagnosis_report import rank_step
 from workbench.report.effects_table import headline
 from workbench.report.ranking import log_ticks
 
@@ -202,7 +202,7 @@ class SearchPanel:
                 margin={"l": 10, "r": 10, "t": 8, "b": 40},
                 xaxis=axis(f"step {step}: fitted error, {of.unit} rms", type="log", **log_ticks([*errors, *floors])),
                 yaxis=axis("", tickfont={"size": 11}),
-                shapes=[marked(each, MEASURED) for each in floors],
+                shapes=[mark_line(each, MEASURED) for each in floors],
                 annotations=[_label_floor(each) for each in floors],
                 showlegend=False,
             ),
@@ -278,7 +278,7 @@ class SearchPanel:
                 "bic": "–" if each.evidence is None else f"{each.evidence:.1f}",
                 "outcome": each.said,
             }
-            for each in sorted(ranked(step), key=lambda each: each.order)
+            for each in sorted(rank_step(step), key=lambda each: each.order)
         ]
         table = ui.table(rows=rows, columns=columns, row_key="effect", pagination=10)
         table.props('dense flat bordered wrap-cells data-testid="candidates"').classes("w-full candidates")

@@ -12,7 +12,7 @@ from webpage.telling import errors_told, heading
 from webpage.units import Units
 from workbench.fit.fitted_parameter import Fitted
 from workbench.model.parameters import Parameter
-from workbench.page.explained import about_effect, explained
+from workbench.page.explained import about_effect, explain_text
 from workbench.page.live_model import LiveModel
 from workbench.report.units import parameter as in_words
 
@@ -82,7 +82,7 @@ class Sliders:
                     self._switches[name] = ui.switch(
                         "", value=True, on_change=lambda event, name=name: self._handle_switch(name, event)
                     ).props(f'data-testid="switch-{name}" aria-label="{name}"')
-                    explained(name, about_effect(written))
+                    explain_text(name, about_effect(written))
         undo = ui.button("Undo", icon="undo", on_click=self._undo).props('outline no-caps dense data-testid="undo"')
         undo.classes("q-mt-sm")
         self._follow()

@@ -18,7 +18,7 @@ from workbench.compare.comparison_sentences import Stretch, slip_sentences
 from workbench.compare.slip_matching import SlipEvents
 from workbench.data.record import Record
 from workbench.report.charts import Figure, axis, layout
-from workbench.report.plot_series import extremes, rounded, running_s
+from workbench.report.plot_series import extremes, round_values, running_s
 
 MOST_LINE_POINTS, MOVING = 2400, 1200
 """Points of a line in the window at most; and while a slider moves it, when it is drawn many times a second."""
@@ -101,8 +101,8 @@ class TimeFigure:
         for each in times:
             at = np.asarray(each, np.float64)
             rows = np.clip(np.searchsorted(begin_s, at), 0, begin_s.size - 1)
-            x.append(rounded(self._along_s[rows], 4))
-            y.append(rounded(per_si * self._record.position_m[rows], 4))
+            x.append(round_values(self._along_s[rows], 4))
+            y.append(round_values(per_si * self._record.position_m[rows], 4))
         return {"x": x, "y": y, "text": texts}
 
     def figure(self, ink: Ink) -> Figure:
@@ -171,7 +171,7 @@ class TimeFigure:
         first, end = np.searchsorted(self._along_s, ends_s)
         first, end = max(0, int(first) - 1), min(self._along_s.size, int(end) + 1)
         rows = first + extremes(values[first:end], most)
-        return rounded(self._along_s[rows], 5), rounded(per_si * values[rows], 5)
+        return round_values(self._along_s[rows], 5), round_values(per_si * values[rows], 5)
 
 
 def _colour(name: str, ink: Ink) -> str:

@@ -153,7 +153,7 @@ def spectrum(each: Spectrum, read: Reading) -> Figure:
     }
 
 
-def marked(x: float, colour: str, dash: str = "dash") -> Mapping[str, Any]:
+def mark_line(x: float, colour: str, dash: str = "dash") -> Mapping[str, Any]:
     """Return a vertical line across the plot."""
     return {
         "type": "line", "x0": x, "x1": x, "yref": "paper", "y0": 0, "y1": 1,

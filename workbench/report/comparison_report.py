@@ -7,7 +7,7 @@ import numpy as np
 
 from config.recording import period_text
 from workbench.compare.comparison import ADEQUATE, Comparison, Phase
-from workbench.compare.comparison_sentences import shortened
+from workbench.compare.comparison_sentences import shorten_notes
 from workbench.report.charts import MEASURED, MODEL, Figure, correlation, profiles, spectrum
 from workbench.report.overlay import Simulated, overlay, phase_shades
 from workbench.report.page import (
@@ -16,7 +16,7 @@ from workbench.report.page import (
     Subject,
     bullets,
     figures_of_merit,
-    folded,
+    fold_parts,
     glossary,
     heading,
     pair,
@@ -167,12 +167,12 @@ def overlaid(figure: Figure, ground: str, samples: int) -> Html:
             figure,
             640,
             "Above the stem position, in the middle the error (simulated less measured), below the command. "
-            f"{ground} Drag across a plot to look closer, all three follow; double-click to return.{thinned(samples)}",
+            f"{ground} Drag across a plot to look closer, all three follow; double-click to return.{thinning(samples)}",
         ),
     )
 
 
-def thinned(count: int) -> str:
+def thinning(count: int) -> str:
     """Say how a long series is drawn; empty for a short one."""
     if count <= MOST_SERIES_POINTS:
         return ""
@@ -247,7 +247,7 @@ def _friction(each: Comparison) -> Html:
     read = Reading(each.own)
     force = (read.title("friction, N"), 1.0, read.kind.force.si, read.kind.force.si)
 
-    def drawn(way: str) -> Figure:
+    def draw_way(way: str) -> Figure:
         pair_ = getattr(each.friction, way)
         parts = [(name, colour, part) for (name, colour), part in zip(both, pair_, strict=True)]
         millimetres = "velocity, mm/s (opening +)" if way == "over_velocity" else "position, mm"
@@ -261,10 +261,10 @@ def _friction(each: Comparison) -> Html:
             "and any force that the model lacks. Drawn from the measurement and, in the same way, from the model. "
             "Where the two part, something is missing that depends on that velocity or that position."
         ),
-        plot("plot-friction-velocity", drawn("over_velocity"), 330, "Friction over velocity."),
+        plot("plot-friction-velocity", draw_way("over_velocity"), 330, "Friction over velocity."),
         pair(
-            plot("plot-friction-opening", drawn("opening_over_position"), 300, "Over position, while opening."),
-            plot("plot-friction-closing", drawn("closing_over_position"), 300, "Over position, while closing."),
+            plot("plot-friction-opening", draw_way("opening_over_position"), 300, "Over position, while opening."),
+            plot("plot-friction-closing", draw_way("closing_over_position"), 300, "Over position, while closing."),
         ),
     )
 
@@ -308,7 +308,7 @@ def _at(times_s: tuple[float, ...]) -> str:
 
 def _statistics(each: Comparison) -> Html:
     read = Reading(each.own)
-    return folded(
+    return fold_parts(
         "statistics",
         "For specialists: correlations and spectrum of the error",
         text(
@@ -361,4 +361,4 @@ def recording(subject: Subject, notes: tuple[str, ...], more: list[str]) -> Html
     """Return what is known of the recording itself."""
     said = [f"{key}: {value}" for key, value in subject.metadata.items()]
     whole = [] if notes else ["Nothing in it had to be left out or cut"]
-    return section("recording", "About the recording", bullets([*shortened(notes), *whole, *more, *said]))
+    return section("recording", "About the recording", bullets([*shorten_notes(notes), *whole, *more, *said]))

@@ -16,7 +16,7 @@ from workbench.model.sampling import MORE_LANDINGS
 from workbench.report import ranking
 from workbench.report.charts import EXTENDED, MODEL, QUIET, axis, layout, line
 from workbench.report.comparison_report import MEANINGS, WORDS, facts, overlaid, recording
-from workbench.report.effects_table import RankedStep, added_effects, headline, not_told_apart, outcome, tried_effects
+from workbench.report.effects_table import RankedStep, headline, not_told_apart, outcome, show_added, show_tried
 from workbench.report.overlay import HELD_OUT, Mask, Shade, Simulated, overlay
 from workbench.report.page import (
     Html,
@@ -24,18 +24,18 @@ from workbench.report.page import (
     Subject,
     bullets,
     figures_of_merit,
-    folded,
+    fold_parts,
     glossary,
     heading,
+    keep_lines,
     plot,
-    preformatted,
     section,
     table,
     text,
     verdict,
     write,
 )
-from workbench.report.plot_series import drawn, rounded
+from workbench.report.plot_series import draw_series, round_values
 from workbench.report.ranking import RankedEffect
 from workbench.report.signature_loop import signature
 from workbench.report.units import Reading, Shown, of_stroke, times
@@ -246,11 +246,13 @@ def _where(validation: _Validation) -> Html:
 
 
 def _ranking(diagnosis: Diagnosis, validation: _Validation) -> Html:
-    steps = [RankedStep(step.before.effects, step.before.errors.test_rmse_m, ranked(step)) for step in diagnosis.steps]
-    return tried_effects(steps, validation.floor_m, Reading(diagnosis.kind).errors)
+    steps = [
+        RankedStep(each.before.effects, each.before.errors.test_rmse_m, rank_step(each)) for each in diagnosis.steps
+    ]
+    return show_tried(steps, validation.floor_m, Reading(diagnosis.kind).errors)
 
 
-def ranked(step: EffectStep) -> list[RankedEffect]:
+def rank_step(step: EffectStep) -> list[RankedEffect]:
     """Return what came of each effect of a step."""
     added, rivals = step.added.name if step.added else "", [each.name for each in step.indistinguishable]
     return [
@@ -275,13 +277,13 @@ def _section_of_added(diagnosis: Diagnosis) -> Html:
         for name in names
     ]
     head = ["Parameter", "Before", "After", "95 % interval", "Unit"]
-    return added_effects(diagnosis.missing, table("table-parameters", head, rows, (0,)))
+    return show_added(diagnosis.missing, table("table-parameters", head, rows, (0,)))
 
 
 def _parameter(name: str, before: Fitted | None, after: Fitted | None, read: Reading) -> Row:
     words, factor, unit = read.parameter(name)
 
-    def shown(each: Fitted | None) -> Shown:
+    def show_fitted(each: Fitted | None) -> Shown:
         return (
             Shown("–")
             if each is None
@@ -290,13 +292,13 @@ def _parameter(name: str, before: Fitted | None, after: Fitted | None, read: Rea
 
     interval = "–" if after is None else f"{factor * after.lower:.4g} to {factor * after.upper:.4g}"
     remark = "at the end of its physical range" if after and after.at_bound else ""
-    return Row([words, shown(before), shown(after), interval, unit], remark)
+    return Row([words, show_fitted(before), show_fitted(after), interval, unit], remark)
 
 
 def _next(diagnosis: Diagnosis, commands: Sequence[str]) -> Html:
     chosen = diagnosis.experiment
     adding = (text("To add what is missing, type:" if len(commands) == 1 else "To add one of them, type:"),)
-    acting = (*adding, preformatted("\n".join(commands))) if commands else ()
+    acting = (*adding, keep_lines("\n".join(commands))) if commands else ()
     if chosen is None:
         return section("next", "What to do next", *acting, bullets(_advice(diagnosis)))
     return section(
@@ -356,14 +358,14 @@ def _advice(diagnosis: Diagnosis) -> list[str]:
 
 
 def _command(chosen: Experiment, read: Reading) -> dict[str, object]:
-    series, command = drawn(chosen.time_s, chosen.command_pa), read.kind.command.read
+    series, command = draw_series(chosen.time_s, chosen.command_pa), read.kind.command.read
     trace = line(
-        rounded(series.time_s, 4),
-        rounded(command.factor * series.value, 3),
+        round_values(series.time_s, 4),
+        round_values(command.factor * series.value, 3),
         "command",
         QUIET,
         f"%{{y:.2f}} {command.unit} (%{{customdata:.6~g}} {read.kind.command.si})<br>at %{{x:.3f}} s",
-        customdata=rounded(series.value, 0),
+        customdata=round_values(series.value, 0),
     )
     return {
         "data": [trace],
@@ -391,7 +393,7 @@ def _undetectable(diagnosis: Diagnosis) -> Html:
 
 def _preview(diagnosis: Diagnosis) -> Html:
     rows = [Row([each.name, f"{100 * each.score:.3g} %"]) for each in diagnosis.preview]
-    return folded(
+    return fold_parts(
         "preview",
         "For specialists: the first guess, before any effect was fitted",
         text("Share of the error that a weak effect of each kind would explain: a guess, right in about two of three."),

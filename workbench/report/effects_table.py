@@ -5,7 +5,7 @@ from dataclasses import dataclass
 
 from sim.effect import Effect, find_effect
 from workbench.report import ranking
-from workbench.report.page import Html, Row, plot, preformatted, section, subheading, table, text
+from workbench.report.page import Html, Row, keep_lines, plot, section, subheading, table, text
 from workbench.report.ranking import RankedEffect
 from workbench.report.units import Quantity
 from workbench.select.effect_acceptance import LEAST_BIC, LEAST_HELD_OUT
@@ -51,7 +51,7 @@ def outcome(name: str, added: str, indistinguishable: Collection[str], *, refuse
     return "refused" if refused else "accepted"
 
 
-def tried_effects(steps: Sequence[RankedStep], floor: float | None, of: Quantity) -> Html:
+def show_tried(steps: Sequence[RankedStep], floor: float | None, of: Quantity) -> Html:
     """Return the section of all steps."""
     shown = [
         text(
@@ -104,12 +104,12 @@ def _row_of(each: RankedEffect, of: Quantity) -> Row:
     )
 
 
-def added_effects(names: Sequence[str], *parameters: Html) -> Html:
+def show_added(names: Sequence[str], *parameters: Html) -> Html:
     """Return the section of what was added, with its equations; `parameters` is HTML that follows."""
     parts = []
     for effect in map(_effect, names):
         parts += [subheading(effect.name), text(effect.text, f"In a record: {effect.looks}" if effect.looks else "")]
-        parts.append(preformatted(effect.equation))
+        parts.append(keep_lines(effect.equation))
     if not parts:
         parts = [text("No effect was added; the parameters below are those of the valve itself, refitted.")]
     return section("added", "What was added", *parts, *parameters)

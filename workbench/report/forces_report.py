@@ -14,7 +14,7 @@ from workbench.report import ranking
 from workbench.report.charts import EXTENDED, MEASURED, MODEL, QUIET, Figure, axis, layout, line, profiles
 from workbench.report.comparison_report import WORDS
 from workbench.report.diagnosis_report import DIAGNOSIS_WORDS
-from workbench.report.effects_table import RankedStep, added_effects, headline, not_told_apart, outcome, tried_effects
+from workbench.report.effects_table import RankedStep, headline, not_told_apart, outcome, show_added, show_tried
 from workbench.report.page import (
     Html,
     Row,
@@ -31,7 +31,7 @@ from workbench.report.page import (
     verdict,
     write,
 )
-from workbench.report.plot_series import rounded
+from workbench.report.plot_series import round_values
 from workbench.report.ranking import RankedEffect
 from workbench.report.units import FORCE, Shown, force, parameter, times
 
@@ -77,7 +77,7 @@ def report_forces(diagnosis: ForceDiagnosis, path: Path, subject: Subject) -> No
             _friction(diagnosis, balanced_n(diagnosis.rows, subject.valve.valve)),
             _where(diagnosis),
             _ranking(diagnosis),
-            added_effects(diagnosis.missing, _parameters(diagnosis)),
+            show_added(diagnosis.missing, _parameters(diagnosis)),
             not_told_apart(diagnosis.indistinguishable, _names(diagnosis), diagnosis.missing, "nothing in such rows"),
             section("recording", "About the recordings", bullets(diagnosis.rows.notes or (ALL_TAKEN,))),
             section("words", "Words used here", glossary(FORCE_WORDS)),
@@ -149,9 +149,9 @@ def _friction(diagnosis: ForceDiagnosis, measured_n: Column) -> Html:
     every = -(-len(rows) // DRAWN_ROWS)
     left_n = (measured_n - carried_n(rows, best.parameters))[::every]
     explained_n = left_n - best.residual_n[::every]
-    place = rounded(1e3 * rows.position_m[::every], 4)
+    place = round_values(1e3 * rows.position_m[::every], 4)
     traces = [
-        line(place, rounded(force_n, 3), name, colour, HOVER, mode="markers", marker=_dot(colour, place))
+        line(place, round_values(force_n, 3), name, colour, HOVER, mode="markers", marker=_dot(colour, place))
         for name, colour, force_n in (("measured", MEASURED, left_n), ("balance", EXTENDED, explained_n))
     ]
     figure: Figure = {
@@ -232,7 +232,7 @@ def _means(over: Column, values: Column) -> Profile:
 
 def _ranking(diagnosis: ForceDiagnosis) -> Html:
     steps = [RankedStep(step.before.effects, step.before.test_rms_n, _list_tried(step)) for step in diagnosis.steps]
-    return tried_effects(steps, None, FORCE)
+    return show_tried(steps, None, FORCE)
 
 
 def _list_tried(step: ForceStep) -> list[RankedEffect]:
@@ -260,11 +260,11 @@ def _parameters(diagnosis: ForceDiagnosis) -> Html:
 def _parameter(name: str, base: ForceFit, best: ForceFit) -> Row:
     words, factor, unit = parameter(name)
 
-    def shown(value: float | None) -> Shown:
+    def show(value: float | None) -> Shown:
         return Shown("–") if value is None else Shown(f"{factor * value:.4g}", f"{name} = {value:.6g}")
 
     std = best.deviations.get(name)
     spread = "–" if std is None else f"{factor * std:.2g}"
     return Row(
-        [BALANCE.get(name, words), shown(base.parameters.get(name)), shown(best.parameters.get(name)), spread, unit]
+        [BALANCE.get(name, words), show(base.parameters.get(name)), show(best.parameters.get(name)), spread, unit]
     )

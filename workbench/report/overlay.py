@@ -15,7 +15,7 @@ from config.recording import Column
 from workbench.compare.phases import PHASES, STUCK
 from workbench.compare.slip_matching import SlipEvents
 from workbench.report.charts import GRID, INK, MEASURED, QUIET, Figure, Trace, axis, layout, line
-from workbench.report.plot_series import drawn, rounded, running_s
+from workbench.report.plot_series import draw_series, round_values, running_s
 from workbench.report.units import OF_VALVE, Reading
 
 SHADES = {
@@ -91,16 +91,16 @@ def overlay(
         traces.append(_position(time_s, error_m, f"error, {each.name}", each.colour, "y2", read, showlegend=False))
     if slips is not None and bool(np.all(np.diff(time_s) > 0.0)):
         traces += _marks(time_s, measured_m, slips, read.kind.length.factor)
-    command = drawn(time_s, command_pa)
+    command = draw_series(time_s, command_pa)
     asked = _command_label(read, by_setpoint)
     traces.append(
         line(
-            rounded(command.time_s, 5),
-            rounded(asked.factor * command.value, 3),
+            round_values(command.time_s, 5),
+            round_values(asked.factor * command.value, 3),
             asked.name,
             QUIET,
             f"%{{y:.2f}} {asked.unit} (%{{customdata:.6~g}} {asked.si})<br>at %{{x:.3f}} s",
-            customdata=rounded(command.value, asked.digits),
+            customdata=round_values(command.value, asked.digits),
             yaxis="y3",
             showlegend=False,
         )
@@ -150,14 +150,14 @@ def phase_shades(phase: NDArray[np.int64], valid: Mask) -> list[Shade]:
 def _position(
     time_s: Column, position_m: Column, name: str, colour: str, y_axis: str, read: Reading, **changes: object
 ) -> Trace:
-    series = drawn(time_s, position_m)
+    series = draw_series(time_s, position_m)
     return line(
-        rounded(series.time_s, 5),
-        rounded(read.kind.length.factor * series.value, 4),
+        round_values(series.time_s, 5),
+        round_values(read.kind.length.factor * series.value, 4),
         name,
         colour,
         f"%{{y:.3f}} {read.kind.length.unit} (%{{customdata:.5~g}} {read.si})<br>at %{{x:.3f}} s",
-        customdata=rounded(series.value, 7),
+        customdata=round_values(series.value, 7),
         yaxis=y_axis,
         **changes,
     )
@@ -197,7 +197,7 @@ def _marks(time_s: Column, measured_m: Column, slips: SlipEvents, factor: float)
             rows = np.clip(np.searchsorted(along_s, np.asarray(times)), 0, time_s.size - 1)
             yield {
                 "type": "scatter", "mode": "markers", "name": name, "yaxis": "y",
-                "x": rounded(np.asarray(times, np.float64), 5), "y": rounded(factor * measured_m[rows], 4),
+                "x": round_values(np.asarray(times, np.float64), 5), "y": round_values(factor * measured_m[rows], 4),
                 "marker": {"symbol": symbol, "size": 11, "color": colour, "line": {"width": 2, "color": colour}},
                 "hovertemplate": "at %{x:.3f} s<extra>" + name + "</extra>",
             }  # fmt: skip

@@ -134,12 +134,12 @@ def subheading(title: str) -> Html:
     return Html(f"<h3>{escape(title)}</h3>")
 
 
-def folded(name: str, title: str, *parts: Html) -> Html:
+def fold_parts(name: str, title: str, *parts: Html) -> Html:
     """Return what is closed until asked for."""
     return Html(f'<details id="{name}"><summary>{escape(title)}</summary>\n{_lines(parts)}\n</details>')
 
 
-def linked(address: str, shown: Html) -> Html:
+def link_to(address: str, shown: Html) -> Html:
     """Return what leads to an address."""
     return Html(f'<a href="{escape(address)}">{shown}</a>')
 
@@ -159,7 +159,7 @@ def bullets(items: Sequence[str]) -> Html:
     return Html(f"<ul>{_each('li', [sentence(each) for each in items])}</ul>" if items else "")
 
 
-def preformatted(lines: str) -> Html:
+def keep_lines(lines: str) -> Html:
     """Return lines as they are."""
     return Html(f"<pre>{escape(lines)}</pre>" if lines else "")
 

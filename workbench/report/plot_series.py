@@ -34,7 +34,7 @@ def running_s(time_s: Column) -> Column:
     return np.concatenate([[0.0], np.cumsum(np.where(steps > 0.0, steps, period_s))])
 
 
-def drawn(time_s: Column, value: Column, most: int = MOST_SERIES_POINTS) -> Drawn:
+def draw_series(time_s: Column, value: Column, most: int = MOST_SERIES_POINTS) -> Drawn:
     """Return a series, (n,), as it is drawn, broken where `workbench.data.record` breaks it; time, s, as recorded."""
     steps = np.diff(time_s)
     forward = steps[steps > 0.0]
@@ -72,7 +72,7 @@ def stretch(count: int, most: int = MOST_SERIES_POINTS) -> int:
     return -(-count // (most // 3))
 
 
-def rounded(values: Column, decimals: int) -> list[float | None]:
+def round_values(values: Column, decimals: int) -> list[float | None]:
     """Return n numbers for JSON, of (n,); None for what is not a number."""
     kept = np.round(values, decimals).tolist()
     return [each if np.isfinite(each) else None for each in kept]

@@ -5,7 +5,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from workbench.report.charts import EXTENDED, INK, MEASURED, OPEN, QUIET, Figure, axis, layout, marked
+from workbench.report.charts import EXTENDED, INK, MEASURED, OPEN, QUIET, Figure, axis, layout, mark_line
 from workbench.report.plot_series import significant
 from workbench.report.units import Quantity
 
@@ -73,7 +73,7 @@ def ranking(tried: Sequence[RankedEffect], before: float, floor: float | None, o
         "layout": layout(
             xaxis=axis(f"held-out error, rms, {of.unit}", type="log", **log_ticks(shown)),
             yaxis=axis("", categoryorder="array", categoryarray=names[::-1], range=[-0.7, len(names) - 0.3]),
-            shapes=[marked(of.factor * value, colour, dash) for value, colour, dash in lines],
+            shapes=[mark_line(of.factor * value, colour, dash) for value, colour, dash in lines],
             showlegend=True,
         ),
     }

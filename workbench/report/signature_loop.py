@@ -10,7 +10,7 @@ from config.recording import Column
 from workbench.report.charts import MEASURED, Figure, Trace, axis, layout, line
 from workbench.report.overlay import Simulated
 from workbench.report.page import Html, plot, section
-from workbench.report.plot_series import extremes, rounded
+from workbench.report.plot_series import extremes, round_values
 from workbench.report.units import Reading
 
 MOST_LOOP_POINTS = 6000
@@ -35,8 +35,8 @@ def signature(command_pa: Column, measured_m: Column, models: Sequence[Simulated
 def _loop(command_pa: Column, position_m: Column, name: str, colour: str, read: Reading) -> Trace:
     rows, length, command = extremes(position_m, MOST_LOOP_POINTS), read.kind.length, read.kind.command.read
     return line(
-        rounded(command.factor * command_pa[rows], 5),
-        rounded(length.factor * position_m[rows], 4),
+        round_values(command.factor * command_pa[rows], 5),
+        round_values(length.factor * position_m[rows], 4),
         name,
         colour,
         f"%{{y:.3f}} {length.unit} at %{{x:.4~g}} {command.unit}",

@@ -15,7 +15,7 @@ Handler = Callable[[int, FrameType | None], None]
 
 
 @contextmanager
-def told_when_broken_off(command: str, known: Callable[[], str]) -> Iterator[None]:
+def tell_when_broken_off(command: str, known: Callable[[], str]) -> Iterator[None]:
     """Say on standard error what is known when the work is broken off.
 
     Args:
@@ -34,7 +34,7 @@ def told_when_broken_off(command: str, known: Callable[[], str]) -> Iterator[Non
 
 
 @contextmanager
-def ended_by(handler: Handler) -> Iterator[None]:
+def end_by(handler: Handler) -> Iterator[None]:
     """Have a handler take what ends a command at once, so that what it began ends first. What is ignored stays so."""
     before = {each: known for each in ENDS if (known := signal.getsignal(each)) is not signal.SIG_IGN}
     for each in before:
@@ -46,6 +46,6 @@ def ended_by(handler: Handler) -> Iterator[None]:
             signal.signal(each, known)
 
 
-def ended_as_by_ctrl_c() -> AbstractContextManager[None]:
+def end_as_by_ctrl_c() -> AbstractContextManager[None]:
     """Take what ends a command for Ctrl-C: who moves a valve lets go of it then. Under nohup it goes on."""
-    return ended_by(signal.default_int_handler)
+    return end_by(signal.default_int_handler)

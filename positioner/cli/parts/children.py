@@ -7,7 +7,7 @@ from types import FrameType
 from typing import NoReturn
 
 from config.errors import InputError
-from positioner.cli.parts.breaking_off import ended_by
+from positioner.cli.parts.breaking_off import end_by
 from positioner.testing.child_process import ChildProcess, NotStarted, port_in
 
 __all__ = ["port_in", "running"]
@@ -23,7 +23,7 @@ def running(command: str, config: Path, *options: str) -> Iterator[str]:
         InputError: it ended instead of getting ready; says why.
     """
     words = (command, str(config), *options)
-    with ended_by(_end):
+    with end_by(_end):
         try:
             child = ChildProcess("positioner.testing.tied", "positioner.cli", *words, log=config.with_suffix(".log"))
         except NotStarted as error:

@@ -16,7 +16,7 @@ from typing import Any
 
 from config.errors import InputError
 from config.extras import EXTRAS
-from config.offered import offered, origin
+from config.offered import find_offers, origin
 
 GROUP = "positioner.commands"
 COMMANDS = {
@@ -103,7 +103,7 @@ def all_commands() -> dict[str, Command]:
         InputError: two packages bring the same name.
     """
     own = {name: Command(name, extra, None) for name, extra in COMMANDS.items()}
-    brought = offered(GROUP, "command").items()
+    brought = find_offers(GROUP, "command").items()
     return {name: Command(name, ",".join(entry.extras), entry) for name, entry in brought} | own
 
 

@@ -42,7 +42,7 @@ def _whole(what: str, least: int, most: int) -> Callable[[str], int]:
     return number
 
 
-def connected(arguments: argparse.Namespace) -> "Dcs":
+def connect_dcs(arguments: argparse.Namespace) -> "Dcs":
     """Return a DCS for that place, to be used as a context.
 
     Raises:

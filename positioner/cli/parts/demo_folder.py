@@ -10,7 +10,7 @@ from contextlib import contextmanager
 from pathlib import Path
 
 from config.errors import InputError
-from config.lock_file import locked
+from config.lock_file import take_lock
 from positioner.cli.parts.output_files import make_folder
 from positioner.cli.parts.simulated_plant import SLAVE_HEAD
 
@@ -44,7 +44,7 @@ def demo_folder(folder: Path) -> Iterator[Path]:
     """
     make_folder(folder)
     _refuse_strangers(folder)
-    lock = locked(folder / LOCK, "another demo runs there; allowed is another folder")
+    lock = take_lock(folder / LOCK, "another demo runs there; allowed is another folder")
     try:
         for recording in (each for name in LEFT for each in (folder / name).glob(RECORDINGS)):
             recording.unlink()

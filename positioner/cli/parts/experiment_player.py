@@ -8,7 +8,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING
 
 from config.recording import Recording
-from positioner.cli.parts.daemon_address import connected
+from positioner.cli.parts.daemon_address import connect_dcs
 
 if TYPE_CHECKING:
     from config.codes import ExperimentState
@@ -111,7 +111,7 @@ class RunningValve:
             state = dcs.play(program.points, within_s, turn=turn, band=band)
             problem = "" if state.played else why_not(state, dcs)
         points = program.points if state is ExperimentState.COMPLETE else ()
-        recording = recorded(self._folder, self._file.valve.name, points)
+        recording = read_experiment_rows(self._folder, self._file.valve.name, points)
         if recording is None and not problem:
             problem = f"what is recorded in {self._folder} is not the whole of it"
         return Played(recording, state, problem)
@@ -131,7 +131,7 @@ def player_on(file: "DaemonFile", arguments: argparse.Namespace) -> "Player":
             state = dcs.play(points, within_s)
             if state is not ExperimentState.COMPLETE:
                 return Played(None, why_not(state, dcs))
-        recording = recorded(folder, file.valve.name, points)
+        recording = read_experiment_rows(folder, file.valve.name, points)
         return Played(recording, "" if recording else f"what is recorded in {folder} is not the whole of it")
 
     return play
@@ -145,7 +145,7 @@ def why_not(state: "ExperimentState", dcs: "Dcs") -> str:
     return state.text if fault is Fault.NONE else f"fault: {fault.text}"
 
 
-def recorded(folder: Path, valve: str, points: tuple[tuple[float, float], ...]) -> Recording | None:
+def read_experiment_rows(folder: Path, valve: str, points: tuple[tuple[float, float], ...]) -> Recording | None:
     """Return the rows of the experiment that has just ended, once the recorder has written them; None if it does not.
 
     Without points it may have ended anywhere, so whatever was played last is it.
@@ -226,5 +226,5 @@ def _folder(file: "DaemonFile", arguments: argparse.Namespace) -> Path:
 @contextmanager
 def _dcs(arguments: argparse.Namespace) -> "Iterator[Dcs]":
     where = {"config": arguments.config, "valve": arguments.name, "tls": arguments.tls}
-    with connected(argparse.Namespace(host=None, port=None, unit=None, **where)) as dcs:
+    with connect_dcs(argparse.Namespace(host=None, port=None, unit=None, **where)) as dcs:
         yield dcs

@@ -68,20 +68,20 @@ def add_export_arguments(parser: argparse.ArgumentParser) -> None:
 
 def _stroke(word: str) -> float:
     """Read a stroke; `M`, as `import` proposes it, is a word for one that only a person knows."""
-    return _told(word, "the stroke in metres, a number: 0.04 is 40 mm")
+    return _read_number(word, "the stroke in metres, a number: 0.04 is 40 mm")
 
 
 def _pressure(word: str) -> float:
     """Read an end of a range; `AT0` and `AT100` are such words as well."""
-    return _told(word, "a pressure in pascals, a number: 20e3 is 0.2 bar")
+    return _read_number(word, "a pressure in pascals, a number: 20e3 is 0.2 bar")
 
 
 def _period(word: str) -> float:
     """Read a period; `S` is such a word as well."""
-    return _told(word, "the time between two rows in seconds, a positive number: 0.01", positive=True)
+    return _read_number(word, "the time between two rows in seconds, a positive number: 0.01", positive=True)
 
 
-def _told(word: str, what: str, *, positive: bool = False) -> float:
+def _read_number(word: str, what: str, *, positive: bool = False) -> float:
     """Read a number that only a person knows."""
     try:
         value = float(word)

@@ -7,7 +7,7 @@ if TYPE_CHECKING:
     from config.extended_valve import ExtendedValve
 
 
-def extended_valve_of(file: "DaemonFile", source: str) -> "ExtendedValve | None":
+def load_extended_valve(file: "DaemonFile", source: str) -> "ExtendedValve | None":
     """Return what `[law] valve` of a daemon's file names; None where it names none.
 
     Args:

@@ -84,7 +84,7 @@ def run_hidden(bus: str, folder: Path, told: Path | None) -> int:
     with slave_running(bus, folder, "hidden.toml", lockstep_s=HIDDEN_PERIOD_S) as (setup, slave):
         print(f"slave {slave}: the seed's valve, and an effect that the daemon is not told")
         before = _steps("before", folder, setup, slave)
-        found = _extended(recording_in(folder / "before"), bare, folder / "better.toml")
+        found = _extend_valve(recording_in(folder / "before"), bare, folder / "better.toml")
         after = _steps("after", folder, setup, slave, '[law]\nvalve = "better.toml"\n') if found else before
     outcome = HiddenOutcome(before, after, found)
     seconds = time.monotonic() - started_s
@@ -139,7 +139,7 @@ def _wait(dcs: "Dcs", duration_s: float) -> list[float]:
     return positions
 
 
-def _extended(recording: Path, bare: "ValveFile", better: Path) -> tuple[str, ...]:
+def _extend_valve(recording: Path, bare: "ValveFile", better: Path) -> tuple[str, ...]:
     """Diagnose a recording and write the valve file with what it lacked; return that, by name."""
     from config.recording import read_recording
     from config.writing import write_valve

@@ -26,27 +26,27 @@ def extend_commands(diagnosis: "Diagnosis", arguments: argparse.Namespace) -> li
 
 def extend_command(effects: Sequence[str], arguments: argparse.Namespace) -> str:
     """Return the `positioner extend` command that adds effects, or none, to the valve of a diagnosis or a discovery."""
-    fitted = ["--fit", *map(str, arguments.recordings), *_besides(arguments), *_driven(arguments)]
+    fitted = ["--fit", *map(str, arguments.recordings), *_besides(arguments), *_driver_words(arguments)]
     adding = ["--effect", *effects] if effects else []
     return shlex.join(["positioner", "extend", arguments.valve, *adding, *fitted, "-o", OUT])
 
 
 def discover_command(arguments: argparse.Namespace) -> str:
     """Return the `positioner discover` command that looks for the form of what a diagnosis leaves unexplained."""
-    return shlex.join(["positioner", "discover", *_asked_of(arguments), *_driven(arguments), "-o", FORM])
+    return shlex.join(["positioner", "discover", *_address_words(arguments), *_driver_words(arguments), "-o", FORM])
 
 
 def by_pressure_command(arguments: argparse.Namespace) -> str:
     """Return the same `positioner diagnose` command, of the stem from its measured pressure on."""
     tried = ["--effects", *arguments.effects] if arguments.effects else []
-    return shlex.join(["positioner", "diagnose", *_asked_of(arguments), *tried, "--from-pressure"])
+    return shlex.join(["positioner", "diagnose", *_address_words(arguments), *tried, "--from-pressure"])
 
 
-def _driven(arguments: argparse.Namespace) -> list[str]:
+def _driver_words(arguments: argparse.Namespace) -> list[str]:
     return ["--from-pressure"] if arguments.from_pressure else []
 
 
-def _asked_of(arguments: argparse.Namespace) -> list[str]:
+def _address_words(arguments: argparse.Namespace) -> list[str]:
     return [*map(str, arguments.recordings), "--valve", arguments.valve, *_besides(arguments)]
 
 

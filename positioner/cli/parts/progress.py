@@ -11,7 +11,7 @@ from contextlib import contextmanager
 from threading import Event, Lock, Thread
 from typing import Self, TextIO
 
-from positioner.cli.parts.breaking_off import told_when_broken_off
+from positioner.cli.parts.breaking_off import tell_when_broken_off
 from positioner.cli.parts.passing_line import passing
 
 SELDOM_S, BEAT_S = 20.0, 1.0
@@ -102,5 +102,5 @@ def at_work(command: str, what: str = "") -> Iterator[Progress]:
         what: it does, as in "reading rec.csv", if it has no fractions to tell.
     """
     progress = Progress(what=what)
-    with told_when_broken_off(command, lambda: progress.known), progress:
+    with tell_when_broken_off(command, lambda: progress.known), progress:
         yield progress

@@ -47,7 +47,7 @@ def when_shown(driver: "Driver", held_pa: float, nudge_pa: float) -> Shown:
     from drivers.boundary import DriverError
 
     try:
-        shown = _shown(driver, held_pa, nudge_pa)
+        shown = _watch_nudge(driver, held_pa, nudge_pa)
     except (DriverError, CommandFailed) as error:
         if said := _put_back(driver, held_pa):
             raise CommandFailed(f"{error}; and {said}") from None
@@ -60,7 +60,7 @@ def when_shown(driver: "Driver", held_pa: float, nudge_pa: float) -> Shown:
     return shown
 
 
-def _shown(driver: "Driver", held_pa: float, nudge_pa: float) -> Shown:
+def _watch_nudge(driver: "Driver", held_pa: float, nudge_pa: float) -> Shown:
     for _ in range(SETTLE):
         before_pa = driver.exchange(held_pa).pressure_pa
     if before_pa is None:

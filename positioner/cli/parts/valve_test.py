@@ -126,10 +126,10 @@ def playing(test: str, file: "DaemonFile", arguments: argparse.Namespace) -> Ite
     """
     from config.codes import ValveTestVerdict
     from config.errors import CommandFailed
-    from positioner.cli.parts.breaking_off import ended_as_by_ctrl_c
+    from positioner.cli.parts.breaking_off import end_as_by_ctrl_c
     from positioner.tests_on_the_valve.outcome import Outcome
 
-    with ended_as_by_ctrl_c():
+    with end_as_by_ctrl_c():
         try:
             yield
         except (KeyboardInterrupt, CommandFailed) as error:
