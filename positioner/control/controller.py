@@ -4,6 +4,9 @@
 
 `step` is a function of what it is given: it reads no clock and asks nobody. What a refinement has found is given to it,
 too, and what is to be refined is left in the memory for `Controller`, which keeps the memory from step to step.
+
+Most of the time a law waits. A decision stands as long as the DCS asks for nothing, monitors and supervision find
+nothing, and the law that sees the sample is the same after it: then only that is worked out.
 """
 
 from dataclasses import dataclass, replace
@@ -182,6 +185,7 @@ def first_memory(settings: Settings, held_pa: float, restored: ValveKnowledge | 
         first_landing=0,
         identification=identification,
         statics=statics,
+        stands_for=None,
     )
 
 
@@ -195,6 +199,9 @@ class Now:
     settings: Settings
     stem_m: float | None
     """Measured position of the stem, m; None without a good measurement."""
+    watched: bool = False
+    outcome: SlideOutcome | None = None
+    """What the last change of the command did, once it is `watched`."""
 
 
 def step(
@@ -215,13 +222,30 @@ def step(
     """
     now = Now(memory, sample, requests, settings, sample.position_m if usable(sample, settings.limits) else None)
     monitoring, supervision = _supervised(now)
+    if memory.stands_for is requests and _stands(now, monitoring, supervision):
+        return memory._replace(monitoring=monitoring, supervision=supervision), memory.last
+    after = _decide_anew(now, monitoring, supervision, refinement)
+    if after.last is memory.last and after.law is memory.law and _only_sees(after, requests, settings):
+        after = after._replace(stands_for=requests)
+    return after, after.last
+
+
+def _decide_anew(
+    now: Now, monitoring: MonitorMemory, supervision: SupervisionMemory, refinement: Refinement | None
+) -> ControllerMemory:
+    """Return what is remembered, and with it what is decided, made anew."""
+    memory, sample, requests, settings = now.memory, now.sample, now.requests, now.settings
     mode = supervision.mode
     consumed = _consumed(now, supervision)
     waits = memory.last.restoration.provisional and _waits(now, mode)
     reference, course = _reference(now, mode, consumed, waits=waits)
     experiment = _experiment(now, supervision)
     playing = experiment.commands
-    excitation, excitation_inhibit, outcome = _excited(now, supervision, reference)
+    excitation, excitation_inhibit = _excited(now, supervision, reference)
+    outcome = _outcome(now)
+    if excitation is not None and not excitation.ended and now.stem_m is not None:
+        excitation = climbed(excitation, outcome, memory.statics, settings)
+        excitation_inhibit = excitation.inhibit_reason
     exciting = excitation is not None and not excitation.ended
     identifying, found = identify(
         memory,
@@ -316,7 +340,32 @@ def step(
         first_landing=by_steps,
         identification=memory.identification,
         statics=memory.statics,
-    ), decision
+        stands_for=None,
+    )
+
+
+def _only_sees(memory: ControllerMemory, requests: Requests, settings: Settings) -> bool:
+    """Whether a law follows its reference, and nothing is under way that goes by time or by what it learns."""
+    last = memory.last
+    follows = last.state in FOLLOWING and last.cut_off == WITHIN and not last.one_direction
+    direct = settings.course is None and memory.path is None
+    asked = 0 in requests.eta or last.experiment.commands or memory.excitation is not None
+    return follows and direct and not (asked or last.restoration.provisional)
+
+
+def _stands(now: Now, monitoring: MonitorMemory, supervision: SupervisionMemory) -> bool:
+    """Whether the last decision stands: nothing is seen that is new, and the law asks for what it asked for before."""
+    memory, sample, last = now.memory, now.sample, now.memory.last
+    if supervision.mode is not last.mode or supervision.fault is not NO_FAULT or monitoring.holding is not last.alarms:
+        return False
+    if now.stem_m is None or _outcome(now) is not None:
+        return False
+    seen = _seen(now, memory.reference, last.applied.ratios, None, _dead_band_m(now, last.applied))
+    if seen.dead_band_m != last.dead_band_m or memory.law.observe(seen) is not memory.law:
+        return False
+    at_rest = memory.statics.detector.rest is not None
+    memory.identification.look_on(sample.time_s, sample.position_m, sample.pressure_pa, at_rest=at_rest)
+    return True
 
 
 def _supervised(now: Now) -> tuple[MonitorMemory, SupervisionMemory]:
@@ -371,28 +420,24 @@ def _needs(now: Now, band: RestBand | None) -> Needs:
 
 def _excited(
     now: Now, supervision: SupervisionMemory, reference: Reference
-) -> tuple[ActiveExcitation | None, InhibitReason, SlideOutcome | None]:
-    """Return the excitation after this sample, what inhibits it, and what the last change of the command did."""
-    memory, settings, statics = now.memory, now.settings, now.memory.statics
+) -> tuple[ActiveExcitation | None, InhibitReason]:
+    """Return the excitation of this sample, before its next step, and what inhibits it."""
+    memory = now.memory
     excitation, inhibit_reason = excitation_after(
         memory.excitation,
         supervision.mode,
         now.sample.now_s,
         now.stem_m,
         now.requests,
-        settings,
+        now.settings,
         held_pa=memory.wanted_pa,
         reference=reference,
         ratios=memory.last.applied.ratios,
         faulty=supervision.fault is not NO_FAULT,
     )
     if excitation is not None and memory.excitation is None and not excitation.ended:
-        statics.restart()
-    outcome = _outcome(now)
-    if excitation is None or excitation.ended or now.stem_m is None:
-        return excitation, inhibit_reason, outcome
-    excitation = climbed(excitation, outcome, statics, settings)
-    return excitation, excitation.inhibit_reason, outcome
+        memory.statics.restart()
+    return excitation, inhibit_reason
 
 
 def _dead_band_m(now: Now, applied: Applied) -> float:
@@ -404,9 +449,9 @@ def _dead_band_m(now: Now, applied: Applied) -> float:
     band = None
     if settings.jumps:
         band = rest_band(memory.monitoring.frozen.band, applied.ratios, statics, settings.stroke_m)
-    return settings.in_force_m(
-        statics.detector.noise_m, breakaway, applied.ratios, 0.0 if band is None else band.jump_m
-    )
+    jump_m, before_m = 0.0 if band is None else band.jump_m, memory.last.dead_band_m
+    in_force_m = settings.in_force_m(statics.detector.noise_m, breakaway, applied.ratios, jump_m)
+    return before_m if in_force_m == before_m else in_force_m
 
 
 def _law(now: Now, before: Law, seen: Seen) -> tuple[int, Law]:
@@ -497,20 +542,21 @@ def _experiment(now: Now, supervision: SupervisionMemory) -> PlayedExperiment:
 
 
 def _outcome(now: Now) -> SlideOutcome | None:
-    """Return what a change of the command did, in the step in which it is known.
+    """Return what a change of the command did, in the step in which it is known: found out when first asked for.
 
     Of a device that was left alone, or is found with another command than it was given, nobody knows what it did
     meanwhile: that is no slide of a command. One that still holds what it was given after a lost reply has obeyed.
     """
-    if now.stem_m is None:
-        return None
-    sample, wanted_pa = now.sample, now.memory.wanted_pa
+    if now.watched or now.stem_m is None:
+        return now.outcome
+    now.watched, sample, wanted_pa = True, now.sample, now.memory.wanted_pa
     if sample.unattended_s > 0.0 or not _obeyed(now):
         now.memory.statics.detector.interrupt()
         return None
     path, valve = now.memory.path, now.settings.valve
     arrived = path is None or valve is None or path.has_arrived(sample.now_s, valve.inverse)
-    return now.memory.statics.update(sample.now_s, now.stem_m, wanted_pa, sample.pressure_pa, arrived=arrived)
+    now.outcome = now.memory.statics.update(sample.now_s, now.stem_m, wanted_pa, sample.pressure_pa, arrived=arrived)
+    return now.outcome
 
 
 def _obeyed(now: Now) -> bool:

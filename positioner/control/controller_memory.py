@@ -14,6 +14,7 @@ from positioner.control.played_experiment import PlayedExperiment
 from positioner.control.pressure_path import PathMemory
 from positioner.control.records import by_name
 from positioner.control.reference import Reference
+from positioner.control.requests import Requests
 from positioner.control.restoration import Restoration
 from positioner.control.supervision import SupervisionMemory
 from positioner.control.travel.course import OnCourse
@@ -88,6 +89,8 @@ class ControllerMemory(NamedTuple):
     """The direction in which the stem goes by steps to its first landing, 0: it does not; see `first_landing`."""
     identification: Identification
     statics: StaticIdentification
+    stands_for: Requests | None
+    """The requests for which the last decision stands until something else is seen; None: each step decides anew."""
 
     def copied(self) -> "ControllerMemory":
         """Return another one of all that is known: what is done with either leaves no trace in the other."""

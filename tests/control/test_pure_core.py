@@ -2,7 +2,7 @@
 
 from array import array
 from collections import deque
-from collections.abc import Mapping, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import replace
 from functools import cache
 from types import MethodType
@@ -110,3 +110,42 @@ def test_the_same_memory_and_inputs_give_the_same_and_a_copy_leaves_no_trace(law
     original, decisions = decided(before, settings, then)
     assert decisions == once != other
     assert whole(original) == whole(after)
+
+
+def disturbed(given: Inputs, rng: np.random.Generator) -> Inputs:
+    """What happens to a valve at rest now and then: replies lost, a push, a status, another mode, a writer, S3."""
+    events: Sequence[Callable[[Sample, Requests], tuple[Sample, Requests]]] = (
+        lambda sample, requests: (sample._replace(quality=Quality.LOST), requests),
+        lambda sample, requests: (sample._replace(position_m=sample.position_m + 4e-3), requests),
+        lambda sample, requests: (sample._replace(status=1), requests),
+        lambda sample, requests: (sample._replace(held_pa=5e4, overwritten=True), requests),
+        lambda sample, requests: (sample, replace(requests, mode=Mode.MANUAL, mode_writes=requests.mode_writes + 1)),
+        lambda sample, requests: (sample, replace(requests, eta=(0, 0, 0))),
+        lambda sample, requests: (sample, replace(requests, eta=(1, 0, 0))),
+        lambda sample, requests: (sample, replace(requests, reference_m=0.31 * STROKE_M, reference_writes=99)),
+    )
+    told, left, event, ended = [], 0, events[0], 0
+    for sample, asked in given:
+        if not left and rng.random() < 0.03:
+            left, event = int(rng.integers(1, 12)), events[int(rng.integers(len(events)))]
+        requests = replace(asked, acknowledgements=ended, mode_writes=asked.mode_writes + ended)
+        told.append(event(sample, requests) if left else (sample, requests))
+        left, ended = max(0, left - 1), ended + (left == 1)
+    return told
+
+
+@pytest.mark.parametrize("law", LAWS)
+@pytest.mark.parametrize("seed", range(2))
+def test_a_decision_that_stands_is_the_one_that_would_be_made_anew(law: str, seed: int) -> None:
+    settings = Settings.of(daemon(law))
+    given = disturbed(inputs(law), np.random.default_rng(seed)) if seed else inputs(law)
+    stood, memory, anew = 0, first_memory(settings, 0.0), first_memory(settings, 0.0)
+    kept = Requests()
+    for sample, asked in given:
+        requests = kept = kept if kept == asked else asked  # a DCS writes when something changes
+        stood += memory.stands_for is requests
+        memory, decision = step(memory, sample, requests, settings)
+        anew, again = step(anew._replace(stands_for=None), sample, requests, settings)
+        assert repr(decision) == repr(again)
+    assert whole(memory._replace(stands_for=None)) == whole(anew._replace(stands_for=None))
+    assert stood > (0 if seed else 100)

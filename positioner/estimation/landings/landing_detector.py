@@ -15,7 +15,7 @@ long it takes. An answer is as long as it was seen to be: an outage is no slowne
 """
 
 from collections.abc import Callable
-from math import hypot, isnan, nan, sqrt
+from math import hypot, inf, isnan, nan, sqrt
 from typing import NamedTuple
 
 from config.codes import InhibitReason
@@ -140,7 +140,7 @@ class LandingDetector:
         self.answers = Answers()
         self._step_pa = 0.0
         """The longest way to the command in force from where the pressure may have been since the last rest."""
-        self._left_pa: tuple[float, ...] = ()
+        self._left_pa = (inf, -inf)
         """The least and the most of the commands since then."""
         self._rested_pa: float | None = None
         """The command before the last change, if the stem rested under it."""
@@ -250,10 +250,10 @@ class LandingDetector:
         """Begin to wait for what a change of the command does; the stem starts from its rest, or from where it is."""
         if self.rest is None and not self._known and self._under_way and not self._late:
             self._learn_answer(time_s - self._level_s)
-        left_pa = (self._level_pa,) if self.rest is not None else (*self._left_pa, self._level_pa)
-        known_pa = [each_pa for each_pa in left_pa if not isnan(each_pa)]
-        self._left_pa = (min(known_pa), max(known_pa)) if known_pa else ()
-        self._step_pa = max((abs(command_pa - each_pa) for each_pa in known_pa), default=0.0)
+        least_pa, most_pa = (inf, -inf) if self.rest is not None else self._left_pa
+        if not isnan(self._level_pa):
+            least_pa, most_pa = min(least_pa, self._level_pa), max(most_pa, self._level_pa)
+        self._left_pa, self._step_pa = (least_pa, most_pa), max(command_pa - least_pa, most_pa - command_pa, 0.0)
         self._running_on = self.rest is None
         self._rested_pa = None if self.rest is None or isnan(self._level_pa) else self._level_pa
         self._from_m = nan if isnan(self._level_pa) else self._position_m if self.rest is None else self.rest.position_m

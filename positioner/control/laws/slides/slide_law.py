@@ -156,7 +156,7 @@ def balance_after(before: Balance | None, ratios: Ratios, seen: Seen, stroke_m: 
         landings=statics.balances,
         stroke_m=stroke_m,
         valve=valve,
-        now_s=seen.sample.now_s,
+        now_s=seen.sample.now_s if drifts else 0.0,
         held=statics.held,
         swing=statics.law.swing if valve is None else 0.0,
     )

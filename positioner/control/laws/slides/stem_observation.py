@@ -3,17 +3,18 @@
 x = y^-1(indicated + s play/2)            s the direction in which the stem moved last
 """
 
-from dataclasses import dataclass, replace
+from dataclasses import replace
+from typing import NamedTuple
 
 from config.codes import InhibitReason
 from config.extended_valve import ExtendedValve
 from positioner.control.laws.boundary import Seen
+from positioner.control.records import by_name
 from positioner.estimation.landings.landing_detector import SlideOutcome
 from positioner.estimation.landings.stem_at_rest import Rest
 
 
-@dataclass(frozen=True, slots=True, kw_only=True)
-class StemObservation:
+class StemObservation(NamedTuple):
     """m, s."""
 
     now_s: float
@@ -27,10 +28,13 @@ class StemObservation:
     """Why it should long have come to rest, and no rest counts."""
 
 
+observation_of = by_name(StemObservation)
+
+
 def observed(seen: Seen) -> StemObservation:
     """Return what is seen of the stem in one step."""
     detector = seen.statics.detector
-    observation = StemObservation(
+    observation = observation_of(
         now_s=seen.sample.now_s,
         position_m=seen.sample.position_m,
         rest=detector.rest,
@@ -43,8 +47,7 @@ def observed(seen: Seen) -> StemObservation:
 
 def _of_stem(observation: StemObservation, valve: ExtendedValve, direction: int) -> StemObservation:
     rest = observation.rest
-    return replace(
-        observation,
+    return observation._replace(
         quantum_m=max(observation.quantum_m, valve.inverse.quantum_m),
         position_m=valve.stem_m(observation.position_m, direction),
         rest=None if rest is None else replace(rest, position_m=valve.stem_m(rest.position_m, direction)),
