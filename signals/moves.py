@@ -7,13 +7,14 @@ lies between two motions is a rest. A move begins after the last sample that lie
 the first that lies at the rest after it.
 
 A rest must show: between two moves the slope a of the samples must be less than half that of the whole, by 3
-deviations,
+deviations, and then less than half that of the slower move,
 
-    |a| + 3 sigma sqrt(12 / L^3) < |x_e - x_b| / (2 (e - b))     L samples of it; b, e where the moves begin and end
+    |a| + 3 sigma sqrt(12 / L^3) < |x_e - x_b| / (2 (e - b))     L samples of it; b, e where the whole, or the slower
+                                                                 of the two moves, begins and ends
 
-else both are one: a stem that slides slowly, seen through noise, is no stem that sticks and slips. What goes on in the
-same direction, by less than `TAIL` noises and more slowly than the whole, is the end of the move before: a stem that
-breaks loose is fast. What comes back to where it was, without a rest there, has moved if it went `OUT_AND_BACK`.
+else both are one: a stem that slides slowly, seen through noise, is no stem that sticks and slips, and what goes on no
+faster than between them is the end of the move before, as behind a lag. Where the stem turns, it is the faster move.
+What comes back to where it was, without a rest there, has moved if it went `OUT_AND_BACK`.
 
 A slip is a part of a move in one direction: the move is cut where it turns back by so much.
 
@@ -48,12 +49,10 @@ COVERED = 6.0
 """Standard deviations of the noise that a move covers: what creeps by less is a rest, of a sensor that settles."""
 OUT_AND_BACK = 12.0
 """Standard deviations that a stem goes back by, to have turned: noise alone spans 7 in a few hundred samples."""
-TAIL = 20.0
-"""Standard deviations of the noise: farther than what is left of a slide behind a lag when it no longer shows."""
 AT_ONCE, STRAIGHT_DEVIATIONS = 4, 4.0
 """Samples in which a record shows that it begins at rest, or at which velocity; off a straight line, in noises."""
 SURELY, SLOWER = 3.0, 0.5
-"""Deviations of the slope of a rest, and the share of the mean slope about it, below which it is one."""
+"""Deviations of the slope of a rest, and the share of the slope beside it, below which it is one."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -128,9 +127,9 @@ def moves(position_m: Array, noise_m: float) -> tuple[Move, ...]:
     edges = np.flatnonzero(np.diff(np.concatenate([[False], steps, [False]])))
     runs = [(int(first), int(end)) for first, end in zip(edges[::2], edges[1::2], strict=True)]
     # Steps first .. end - 1 move: samples `first` and `end` are the last and the next at rest.
-    apart = _joined(runs, lambda one, other: not _rests_between(x, noise_m, one, other))
+    apart = _joined(runs, lambda one, other: not _rests_between(x, noise_m, one, other, _about))
     shown = [run for run in apart if _covers(x, noise_m, run)]
-    apart = _joined(shown, lambda one, other: _is_tail(x, noise_m, one, other))
+    apart = _joined(shown, lambda one, other: not _rests_between(x, noise_m, one, other, _slower))
     return tuple(_fitted(x, noise_m, apart))
 
 
@@ -246,16 +245,27 @@ def _joined(runs: list[Run], belong: Callable[[Run, Run], bool]) -> list[Run]:
     return joined
 
 
-def _is_tail(x: Array, noise_m: float, one: Run, other: Run) -> bool:
-    """Return whether the second of two moves is but the end of the first."""
-    went, goes = float(x[one[1]] - x[one[0]]), float(x[other[1]] - x[other[0]])
-    whole = abs(float(x[other[1]] - x[one[0]])) / (other[1] - one[0])
-    slow = abs(goes) / (other[1] - other[0]) < whole
-    return went * goes > 0.0 and abs(goes) < TAIL * noise_m and slow
+def _speed(x: Array, run: Run) -> float:
+    """Return how fast the stem goes in a run, m a sample, whichever way."""
+    return float(np.ptp(x[run[0] : run[1] + 1])) / (run[1] - run[0])
 
 
-def _rests_between(x: Array, noise_m: float, one: Run, other: Run) -> bool:
-    """Return whether the samples between two moves show a rest."""
+def _turns(x: Array, one: Run, other: Run) -> bool:
+    return bool((x[one[1]] - x[one[0]]) * (x[other[1]] - x[other[0]]) < 0.0)
+
+
+def _about(x: Array, one: Run, other: Run) -> float:
+    """Return how fast the stem goes, m a sample, with what is between; where it turns, in the faster move."""
+    return max(_speed(x, one), _speed(x, other)) if _turns(x, one, other) else _speed(x, (one[0], other[1]))
+
+
+def _slower(x: Array, one: Run, other: Run) -> float:
+    """Return how fast the slower of two moves goes, m a sample; where the stem turns, the faster."""
+    return _about(x, one, other) if _turns(x, one, other) else min(_speed(x, one), _speed(x, other))
+
+
+def _rests_between(x: Array, noise_m: float, one: Run, other: Run, going: Callable[[Array, Run, Run], float]) -> bool:
+    """Return whether the samples between two moves show a rest, against how fast the stem goes beside it."""
     first, last = one[1], other[0]
     count = last - first + 1
     if count < FEWEST_REST_SAMPLES:
@@ -263,11 +273,8 @@ def _rests_between(x: Array, noise_m: float, one: Run, other: Run) -> bool:
     rows = np.arange(count) - 0.5 * (count - 1)
     square = float(rows @ rows)
     slope = float(rows @ x[first : last + 1]) / square
-    mean = abs(float(x[other[1]] - x[one[0]])) / (other[1] - one[0])
-    went, goes = float(x[one[1]] - x[one[0]]), float(x[other[1]] - x[other[0]])
-    if went * goes < 0.0:  # it turned round: what it did between is seen against the faster of both
-        mean = max(abs(float(x[b] - x[a])) / (b - a) for a, b in (one, other))
-    return bool(abs(slope) + SURELY * noise_m / np.sqrt(square) < SLOWER * mean)
+    speed = going(x, one, other)
+    return bool(abs(slope) + SURELY * noise_m / np.sqrt(square) < SLOWER * speed)
 
 
 def _filled(position_m: Array) -> Array:

@@ -60,6 +60,13 @@ def test_the_end_of_a_slide_behind_a_lag_is_no_move_of_its_own() -> None:
         assert len(moves(x_m + NOISE_M * np.random.default_rng(seed).standard_normal(t.size), NOISE_M)) == 1
 
 
+def test_a_stem_that_creeps_in_small_slips_after_a_large_step_makes_each_of_them() -> None:
+    x_m = (1400.0 * (np.arange(260) >= 60) + 9.0 * sum((np.arange(260) >= row) for row in range(80, 200, 20))) * NOISE_M
+    for seed in range(5):
+        found = moves(x_m + NOISE_M * np.random.default_rng(seed).standard_normal(x_m.size), NOISE_M)
+        assert [each.after for each in found] == [60, *range(80, 200, 20)]
+
+
 def test_a_record_may_begin_and_end_in_motion() -> None:
     x_m = np.concatenate([np.linspace(0.0, 300.0, 60), np.full(100, 300.0), np.linspace(300.0, 0.0, 60)]) * NOISE_M
     first, last = moves(x_m + NOISE_M * np.random.default_rng(3).standard_normal(x_m.size), NOISE_M)
