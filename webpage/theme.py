@@ -40,7 +40,9 @@ h2 { font-size: 1.05rem; font-weight: 600; margin: 6px 0 2px; line-height: 1.3; 
 .body--dark .q-btn.text-negative { color: #ff8a80 !important; }
 .body--dark .q-uploader__header { background: #1b5e8a; }
 @media (max-width: 599px) {
-  .side.before-plots { order: -1; } .steady { height: auto; max-height: 17.5rem; }
+  .side.before-plots { order: -1; } .plots { order: 1; } .after-plots { order: 2; }
+  .compared { display: contents; } .compared > * { flex: none; width: 100%; max-width: none; }
+  .steady { height: auto; max-height: 17.5rem; }
   .panel { padding: 8px 8px 24px; } .q-header { padding: 4px 8px; gap: 4px; }
   .candidates thead { display: none; }
   .candidates tr { display: flex; flex-flow: row wrap; align-items: center; border-top: 1px solid #80808066; }

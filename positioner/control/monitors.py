@@ -34,8 +34,8 @@ ENDS = 0.02
 """Share of the stroke from each end of the travel: there a stem may well stand, whatever the pressure."""
 NOTHING_KNOWN = 0.5
 """Of what the pressure limits allow: so much may a stem need of which nothing is known."""
-ACTUATOR = 0.1
-"""Of what the pressure limits allow: a measured pressure so near the command in force is that of the actuator."""
+ACTUATOR = 0.5
+"""Of the pressures under which the stem rests: one measured so near the command in force is that of the actuator."""
 ANSWERS, UNKNOWN_S = 5.0, 1.0
 """Times as long as the stem takes to answer; where that is not known yet, s."""
 
@@ -263,7 +263,7 @@ def _rests(
     low_pa, high_pa = needed.band.pressures_pa(position_m, settings.frozen_at)
     if not needed.by_law:
         return went_pa <= high_pa - low_pa
-    actuator = abs(frozen.pressure_pa - frozen.command_pa) <= ACTUATOR * settings.span_pa
+    actuator = abs(frozen.pressure_pa - frozen.command_pa) <= ACTUATOR * (high_pa - low_pa)
     measured_pa = pressure_pa if actuator else command_pa
     return max(command_pa, measured_pa) >= low_pa and min(command_pa, measured_pa) <= high_pa
 

@@ -10,7 +10,9 @@ from config.errors import InputError
 from config.loading import validate
 from config.quantities import DeviceStatus
 from positioner.control.controller_memory import Decision
-from positioner.control.monitors import UNKNOWN_S
+from positioner.control.monitors import UNKNOWN_S, MonitorMemory, MonitorSettings, after_cycle, needs_of
+from positioner.control.rest_band import RestBand
+from positioner.estimation.acceptance import Ratios
 from tests.control.test_controller import LAW, STROKE_M, Bench, automatic
 
 Finds = Callable[[Bench], Decision]
@@ -281,3 +283,28 @@ def test_a_device_that_does_not_answer_cannot_be_met_by_hand() -> None:
             {"valve": {"stroke_m": 0.1}, "supervision": {"sample_age": {"action": "manual"}}},
             "d.toml",
         )
+
+
+@pytest.mark.parametrize("maximum_pa", [420e3, 4.2e6])
+@pytest.mark.parametrize(("shown_pa", "frozen"), [(71e3, False), (250e3, True)])
+def test_what_is_measured_is_the_actuators_by_what_the_valve_needs_however_far_the_limits_are(
+    maximum_pa: float, shown_pa: float, *, frozen: bool
+) -> None:
+    """The command falls under what holds the stem. Its own pressure has not followed yet; the supply's never does."""
+    table = {"valve": {"stroke_m": STROKE_M}, "pressure": {"maximum_pa": maximum_pa}}
+    settings = MonitorSettings.of(DaemonFile.model_validate(table))
+    band = RestBand(Ratios(-7.9e5, -2.4e4), (), None, beyond_pa=1.2e4, off_pa=1.6e3)
+    memory = MonitorMemory()
+    for cycle in range(round(20 * UNKNOWN_S)):
+        memory = after_cycle(
+            memory,
+            settings,
+            now_s=0.1 * cycle,
+            position_m=0.09,
+            command_pa=71e3 if cycle < 2 else 1e4,
+            pressure_pa=shown_pa,
+            reference_m=None,
+            faulty=False,
+            needs=lambda _band: needs_of(by_law=True, band=band, allowed_pa=0.0, answers_s=0.1),
+        )
+    assert (Fault.FROZEN_SENSOR in memory.holding) is frozen

@@ -190,6 +190,14 @@ def test_another_tab_sees_none_of_it_and_a_bad_file_is_told(address: str, case: 
         expect(page.get_by_test_id("opened")).to_contain_text("export.csv: 1001 samples over 10 s")
         assert page.evaluate("document.documentElement.scrollWidth") <= 400
 
+        # On a narrow page verdict and controls come before the plots.
+        drop(page, "drop-valve", case / "valve.toml")
+        shown(page)
+        parts = [page.get_by_test_id(each) for each in ("verdict", "slider-spring_n_per_m", "diagnose")]
+        parts.append(page.get_by_role("img", name="position, error and pressure over time"))
+        tops = [each.evaluate("each => each.getBoundingClientRect().top") for each in parts]
+        assert tops == sorted(tops)
+
 
 @pytest.mark.long
 def test_another_recording_is_held_out_and_an_effect_of_ones_own_is_written(address: str, case: Path) -> None:

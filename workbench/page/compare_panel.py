@@ -60,8 +60,8 @@ class ComparePanel:
             self._floor = _figure_of_merit("floor", "floor")
             self._fit = _figure_of_merit("fit", "fit")
             jumps = ui.row().classes("items-center")
-        with ui.element("section").classes("together").props('data-testid="compared"'):
-            with ui.column().classes("wide"):
+        with ui.element("section").classes("together compared").props('data-testid="compared"'):
+            with ui.column().classes("wide plots"):
                 self._time = FigureView(theme, self._draw, TIME_PX, "position, error and pressure over time")
                 self._time.plot.on("plotly_relayout", self._handle_window)
                 self._time.plot.on("plotly_click", self._handle_click, js_handler=POINT)
@@ -73,7 +73,7 @@ class ComparePanel:
                         lambda event, other=other: self._handle_selection(event, other),
                         js_handler=TIMES,
                     )
-            with ui.column().classes("side before-plots"):
+            with ui.column().classes("side"):
                 self._findings = FindingsPanel(self._go_to, stroke_m, desk.units)
                 self._findings.jumps.move(jumps)
                 ui.button("Keep this curve to compare with", icon="bookmark", on_click=self._keep).props(

@@ -131,7 +131,8 @@ class TabPage:
             heading("Model against measurement", "comparison")
             ComparePanel(self._desk, self._theme, self._retell)
             SearchPanel(self._desk, self._theme, self.changed, self._retell)
-            self._journal = JournalPanel(self._desk, self._theme, self.changed)
+            with ui.column().classes("w-full after-plots"):
+                self._journal = JournalPanel(self._desk, self._theme, self.changed)
             if at:
                 look_at(at)
 
