@@ -1,6 +1,7 @@
 """The running realisation held against direct integrals, exact motion and Monte Carlo."""
 
 from collections.abc import Callable
+from functools import cache
 from math import factorial
 
 import numpy as np
@@ -31,7 +32,11 @@ from tests.estimation.stem import (
 
 WINDOW = 0.8
 RNG = np.random.default_rng(7)
-SEED_RUN = run(swing, grid(1e-3, 0, WINDOW))
+
+
+@cache
+def seed_run() -> Run:
+    return run(swing, grid(1e-3, 0, WINDOW))
 
 
 def identifier_of(samples: Run, *, held: bool = True) -> Identifier:
@@ -83,18 +88,18 @@ def test_running_realisation_is_the_direct_multiple_integral_on_an_uneven_grid(h
 
 
 def test_exact_motion_gives_exact_parameters() -> None:
-    np.testing.assert_allclose(solution_of(SEED_RUN).theta, THETA, rtol=2e-5)
+    np.testing.assert_allclose(solution_of(seed_run()).theta, THETA, rtol=2e-5)
 
 
 def test_sign_of_the_motion_does_not_matter() -> None:
-    mirrored = Run(SEED_RUN.time_s, -SEED_RUN.position_m, -SEED_RUN.pressure_pa)
-    np.testing.assert_allclose(solution_of(mirrored).theta, solution_of(SEED_RUN).theta, rtol=1e-9)
+    mirrored = Run(seed_run().time_s, -seed_run().position_m, -seed_run().pressure_pa)
+    np.testing.assert_allclose(solution_of(mirrored).theta, solution_of(seed_run()).theta, rtol=1e-9)
 
 
 @pytest.mark.parametrize("first", [1, 3, 7, 20])
 def test_restart_at_any_instant_of_the_motion(first: int) -> None:
     identifier = Identifier(WINDOW, STROKE, 1e5)
-    for i, sample in enumerate(SEED_RUN.samples()):
+    for i, sample in enumerate(seed_run().samples()):
         if i == first:
             identifier.restart()
         identifier.update(*sample)
@@ -116,14 +121,14 @@ def test_a_grid_with_jitter_and_missing_samples_is_integrated_exactly() -> None:
 
 
 def test_a_time_stamp_that_does_not_advance_is_refused() -> None:
-    identifier = identifier_of(SEED_RUN)
+    identifier = identifier_of(seed_run())
     with pytest.raises(ValueError, match="not after the last sample"):
-        identifier.update(*SEED_RUN.samples()[-1])
+        identifier.update(*seed_run().samples()[-1])
 
 
 def test_pressure_held_and_pressure_continuous_are_two_things() -> None:
     """Half a sample of delay in the pressure costs a, b, c more than a tenth, b/c nothing."""
-    wrong = solution_of(SEED_RUN, held=False).theta
+    wrong = solution_of(seed_run(), held=False).theta
     assert abs(wrong[1] / THETA[1] - 1) > 0.1
     assert wrong[1] / wrong[2] == pytest.approx(THETA[1] / THETA[2], rel=1e-4)
 
@@ -209,9 +214,9 @@ def test_bias_is_that_of_the_mean() -> None:
 
 def test_noise_share_tells_when_the_parameters_are_lost() -> None:
     rng = np.random.default_rng(5)
-    assert solution_of(SEED_RUN.noisy(rng, NOISE), NOISE).noise_share < 0.02
+    assert solution_of(seed_run().noisy(rng, NOISE), NOISE).noise_share < 0.02
     for _ in range(10):
-        assert solution_of(SEED_RUN.noisy(rng, 10 * NOISE), 10 * NOISE).noise_share > 0.05
+        assert solution_of(seed_run().noisy(rng, 10 * NOISE), 10 * NOISE).noise_share > 0.05
 
 
 def test_constant_pressure_is_singular_with_and_without_noise() -> None:
@@ -223,7 +228,7 @@ def test_constant_pressure_is_singular_with_and_without_noise() -> None:
 
 def test_in_its_own_units_the_system_is_well_conditioned() -> None:
     """Condition 2e4, of nearly parallel b and c columns, where SI units make it a million million."""
-    _, P = identifier_of(SEED_RUN).integrals()
+    _, P = identifier_of(seed_run()).integrals()
     si = P * np.array([WINDOW**5, WINDOW**6, WINDOW**6 * 1e5 / STROKE]) * WINDOW ** np.arange(3)[:, None]
-    assert solution_of(SEED_RUN).condition < 1e5
-    assert np.linalg.cond(si) > 1e3 * solution_of(SEED_RUN).condition
+    assert solution_of(seed_run()).condition < 1e5
+    assert np.linalg.cond(si) > 1e3 * solution_of(seed_run()).condition

@@ -1,5 +1,7 @@
 """A stem that moves before its command says that two clocks differ; one that is late, or in a loop, does not."""
 
+from functools import cache
+
 import numpy as np
 import pytest
 
@@ -13,7 +15,10 @@ from workbench.data.record import ready
 from workbench.diagnosis.diagnosis import diagnose
 from workbench.discover.discovery import discover
 
-STEPS = once_a_second(SEED, 1500)
+
+@cache
+def steps() -> Recording:
+    return once_a_second(SEED, 1500)
 
 
 def shifted(recording: Recording, samples: int) -> Recording:
@@ -25,17 +30,17 @@ def shifted(recording: Recording, samples: int) -> Recording:
 @pytest.mark.parametrize(("samples", "least_s", "most_s"), [(2, 0.0, 2.0), (3, 1.0, 3.0)])
 def test_a_command_whose_clock_is_late_is_seen_to(samples: int, least_s: float, most_s: float) -> None:
     """A stem that has moved a sample after a held command is seen a sample less before it."""
-    found = ready(shifted(STEPS, samples)).early
+    found = ready(shifted(steps(), samples)).early
     assert isinstance(found, Early)
     assert (found.least_s, found.most_s) == (least_s, most_s)
     assert found.early == found.turns > 10
-    assert found.sentence in ready(shifted(STEPS, samples)).notes
+    assert found.sentence in ready(shifted(steps(), samples)).notes
 
 
 @pytest.mark.parametrize("late", [0, -2, -3, -6], ids=lambda late: f"stem {-late} s late")
 def test_a_stem_that_is_late_obeys(late: int) -> None:
     """A dead time, or the position's clock: later even than the next change."""
-    assert ready(shifted(STEPS, late)).early is None
+    assert ready(shifted(steps(), late)).early is None
 
 
 @pytest.mark.parametrize(
@@ -83,7 +88,7 @@ def test_a_loop_faster_than_its_samples_is_no_clock(lag: float) -> None:
 @pytest.mark.long
 def test_of_two_clocks_nothing_is_judged() -> None:
     """It was "unexplained": something is missing that the library does not have."""
-    found = diagnose(shifted(STEPS, 3), SEED, effects=["dead_time"])
+    found = diagnose(shifted(steps(), 3), SEED, effects=["dead_time"])
     assert found.verdict == "unjudged"
     assert found.sentence.startswith("Not judged: the stem turns before its command in ")
     assert "turns, by 1 to 3 s: their two clocks differ by that, and by what the stem is late besides" in found.sentence
@@ -93,7 +98,7 @@ def test_of_two_clocks_nothing_is_judged() -> None:
 
 @pytest.mark.long
 def test_nor_is_a_form_sought() -> None:
-    found = discover(shifted(STEPS, 3), SEED)
+    found = discover(shifted(steps(), 3), SEED)
     assert found.outcome == "unjudged"
     assert "two clocks" in found.sentence
 

@@ -2,6 +2,7 @@
 
 from collections.abc import Callable
 from dataclasses import replace
+from functools import cache
 from pathlib import Path
 
 import numpy as np
@@ -22,7 +23,10 @@ from workbench.diagnosis.pressure_scale import pressure_scale
 from workbench.fit.fitting import fit
 from workbench.select.effect_search import evaluated
 
-RECORD = ready(recorded(BARE))
+
+@cache
+def record() -> Record:
+    return ready(recorded(BARE))
 
 
 def behind(lag: float) -> Column:
@@ -32,7 +36,7 @@ def behind(lag: float) -> Column:
 
 
 def measured(pressure_pa: Column) -> Record:
-    return replace(RECORD, pressure_pa=pressure_pa)
+    return replace(record(), pressure_pa=pressure_pa)
 
 
 @pytest.mark.parametrize(
@@ -73,7 +77,7 @@ def test_nothing_is_said_of_what_is_no_scale(lag: float, shown: Callable[[Column
 
 
 def test_without_a_pressure_there_is_none() -> None:
-    assert pressure_scale(replace(RECORD, pressure_pa=None)) is None
+    assert pressure_scale(replace(record(), pressure_pa=None)) is None
 
 
 def by_pressure(pressure_pa: Column) -> Recording:
