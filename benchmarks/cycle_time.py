@@ -30,7 +30,7 @@ from positioner.daemon.link import Link
 from positioner.daemon.pacing import DevicePace
 from positioner.daemon.recorder import Recorder
 from positioner.daemon.snapshot import Snapshot
-from positioner.virtual.virtual_cycle import Script, played, virtual_cycle
+from positioner.virtual.virtual_cycle import Script, play_script, virtual_cycle
 from sim.slave.modbus_slave import device_of
 
 STROKE_M = 0.1016
@@ -138,7 +138,7 @@ def virtual_run() -> list[tuple[Sample, Requests]]:
         seen.append((snapshot.sample, requests))
         return script(snapshot, requests)
 
-    for _ in played(cycle, noting, RUN_S):
+    for _ in play_script(cycle, noting, RUN_S):
         pass
     return seen
 

@@ -33,7 +33,7 @@ from sim.composition import Composition
 from sim.effect import shipped_effect, shipped_effects
 from workbench.blind.hiding import Hidden, hide
 from workbench.blind.trial import LEVELS, NOISE_M, Trial
-from workbench.data.held_out import joined, split
+from workbench.data.held_out import join_recordings, split
 from workbench.data.record import ready
 from workbench.discriminate.discrimination import (
     BUDGET,
@@ -78,7 +78,7 @@ def player(made: Hidden, dirty: bool, seed: int, *, pressure: bool) -> Player:
     quantum_m = made.truth.valve.stroke_m / LEVELS if dirty else 0.0
 
     def play(chosen: DesignedExperiment) -> Played:
-        trial = Trial(chosen.course.sampled(PERIOD_S)[1], PERIOD_S)
+        trial = Trial(chosen.course.sample_every(PERIOD_S)[1], PERIOD_S)
         answer = trial.with_disturbances(truth, generator) if dirty else trial.answer(truth, truth.theta)
         sensor = Sensor(noise_std_m=NOISE_M, quantum_m=quantum_m, seed=int(generator.integers(2**32)))
         whole = trial.recording(answer.indicated_m, sensor, answer.pressure_pa if pressure else None)
@@ -107,7 +107,7 @@ def line(case: Line, how: Sequence[str], workers: int, *, pressure: bool) -> Lin
     dirty = case["setting"] == "dirty"
     made = hide(case["seed"], dirty=dirty, pressure=pressure)
     recordings = [made.fit, made.test]
-    whole = joined(recordings)
+    whole = join_recordings(recordings)
     base = fit(whole, made.base, workers=workers)
     rivals = {name: fit(whole, made.base, effects=(name,), base=base, workers=workers) for name in case["sets"][0]}
     rivals = not_contradicted(rivals, made)

@@ -24,7 +24,7 @@ from config.daemon_file import DaemonFile
 from config.slave_file import SlaveFile
 from config.valve_file import ValveFile, load_valve, shipped_valve
 from positioner.control.requests import QUIET, Requests
-from positioner.virtual.virtual_cycle import identified, virtual_cycle
+from positioner.virtual.virtual_cycle import run_identification, virtual_cycle
 from sim.slave.simulated_device import Device
 from sim.valve import Valve
 
@@ -120,7 +120,7 @@ class Loop:
         self.valve.rest_at(0.0, 0.0)
         device = OwnClock(Device(self.valve, SlaveFile.model_validate(slave), {}), period_s)
         self.cycle = virtual_cycle(file, device, Requests(mode=Mode.AUTOMATIC, mode_writes=1))
-        for _ in identified(self.cycle, S3_LIMIT_S, wait=False):
+        for _ in run_identification(self.cycle, S3_LIMIT_S, wait=False):
             pass
 
     def path(self, reference: float, for_s: float) -> np.ndarray:

@@ -135,7 +135,7 @@ __all__ = [
 ]
 
 
-def _loaded(name: str) -> object:
+def _load_name(name: str) -> object:
     """Load one of the library's names at its first use (PEP 562).
 
     Raises:
@@ -163,7 +163,7 @@ def _loaded(name: str) -> object:
 
 
 if not TYPE_CHECKING:  # or a type checker would take any name for one of the library's
-    __getattr__ = _loaded
+    __getattr__ = _load_name
 
 
 def __dir__() -> list[str]:

@@ -96,9 +96,9 @@ def follow(
         ValueError: as `respond`.
         InputError: as `require_numbers`.
     """
-    commands = checked_commands(command_pa)
-    periods = checked_periods(period_s, commands)
-    longest_step_s = checked_step(step_s)
+    commands = check_commands(command_pa)
+    periods = check_periods(period_s, commands)
+    longest_step_s = check_step(step_s)
     path, written = (
         np.empty((PATH_ROWS, commands.size + 1)),
         np.empty(PATH_ROWS * (min(commands.size, PERIODS_AT_ONCE) + 1)),
@@ -141,7 +141,7 @@ def require_numbers(composition: Composition, time_s: Vector, *answers: Vector) 
         )
 
 
-def checked_commands(command_pa: npt.ArrayLike) -> Vector:
+def check_commands(command_pa: npt.ArrayLike) -> Vector:
     """Return a series of commands, Pa, (n,), as the kernel takes it: a copy.
 
     Raises:
@@ -153,7 +153,7 @@ def checked_commands(command_pa: npt.ArrayLike) -> Vector:
     return commands
 
 
-def checked_periods(period_s: npt.ArrayLike, commands: Vector) -> Vector:
+def check_periods(period_s: npt.ArrayLike, commands: Vector) -> Vector:
     """Return the periods, s, of the commands, (n,), as the kernel takes them: a copy.
 
     Raises:
@@ -165,7 +165,7 @@ def checked_periods(period_s: npt.ArrayLike, commands: Vector) -> Vector:
     return periods
 
 
-def checked_step(step_s: float) -> float:
+def check_step(step_s: float) -> float:
     """Return a step of the integration.
 
     Raises:

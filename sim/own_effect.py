@@ -11,7 +11,7 @@ EXAMPLE = SHIPPED / "_tight_spot.py"
 """The example of docs/effects.md; no effect that comes along."""
 
 
-def checked(path: Path, valve: ValveParameters) -> Effect:
+def check_effect(path: Path, valve: ValveParameters) -> Effect:
     """Return an effect that reads, compiles, and says where a fit of this valve may start; its text is run.
 
     Raises:

@@ -10,7 +10,7 @@ import numpy.typing as npt
 from config.valve_file import ValveFile
 from sim.composition import Composition
 from sim.karnopp import TOLERANCE, karnopp, read
-from sim.open_loop import PATH_ROWS, STEP_S, Response, at_rest, checked_step, follow
+from sim.open_loop import PATH_ROWS, STEP_S, Response, at_rest, check_step, follow
 
 
 class Valve:
@@ -19,7 +19,7 @@ class Valve:
     def __init__(self, composition: Composition, *, step_s: float = STEP_S) -> None:
         self._composition = composition
         self._theta = composition.theta.copy()
-        self._step_s = checked_step(step_s)
+        self._step_s = check_step(step_s)
         self._command, self._period, self._path = np.zeros(1), np.zeros(1), np.zeros((PATH_ROWS, 2))
         self._state = at_rest(composition, self._theta, 0.0, 0.0, 0.0)
         self._respond = self._bound()

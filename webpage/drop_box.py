@@ -45,12 +45,12 @@ def drop_box(label: str, name: str, taken: Taken, accept: str = "") -> None:
         if take is not None:
             await take(event)
 
-    def refused(event: events.GenericEventArguments) -> None:
+    def refuse(event: events.GenericEventArguments) -> None:
         file, unmet = event.args
         tell_error(refusal(file, unmet, accept))
 
     box = ui.upload(label=label, on_upload=took, max_file_size=MOST_BYTES, auto_upload=True)
-    box.on("rejected", refused, js_handler=REJECTED)
+    box.on("rejected", refuse, js_handler=REJECTED)
     box.on("uploaded", told.set, args=[])
     box.classes("w-full").props(f'flat bordered data-testid="{name}"' + (f' accept="{accept}"' if accept else ""))
 

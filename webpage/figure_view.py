@@ -28,7 +28,7 @@ class FigureView:
     def __init__(self, theme: Theme, draw: Callable[[], Figure], height_px: int, name: str) -> None:
         self._draw = draw
         self._theme = theme
-        self.plot = ui.plotly(self._themed()).classes("w-full").style(f"height: {height_px}px")
+        self.plot = ui.plotly(self._apply_theme()).classes("w-full").style(f"height: {height_px}px")
         self.plot.props(f'data-testid="{name}" role="img" aria-label="{name}"')
         theme.listen(self.redraw)
 
@@ -36,7 +36,7 @@ class FigureView:
         """Draw it anew, if it is still there."""
         if self.plot.is_deleted:
             return
-        self.plot.update_figure(self._themed())
+        self.plot.update_figure(self._apply_theme())
 
     def restyle(self, changes: Mapping[str, Sequence[Any]], traces: Sequence[int]) -> None:
         """Change some traces: for each attribute a value a trace."""
@@ -56,7 +56,7 @@ class FigureView:
         """Change the layout."""
         self.plot.run_plot_method("relayout", dict(changes))
 
-    def _themed(self) -> Figure:
+    def _apply_theme(self) -> Figure:
         ink = self._theme.ink
         changed = {getattr(LIGHT, each.name): getattr(ink, each.name) for each in fields(Ink)}
         figure = _recolour(self._draw(), changed)

@@ -81,7 +81,7 @@ class Gate:
             return
         headers = {name.lower(): value.decode("latin-1") for name, value in scope["headers"]}
         if not _from_here(headers):
-            await _refuse(scope, send, HTTPStatus.FORBIDDEN, self._said("This request comes from another site."))
+            await _refuse(scope, send, HTTPStatus.FORBIDDEN, self._answer_page("This request comes from another site."))
         elif self.sessions.holds(_cookie(headers, self.cookie)):
             await self._through(scope, receive, send, headers)
         elif scope["type"] == "http":
@@ -96,15 +96,15 @@ class Gate:
             await self._let_in(send)
         elif self.sign_in is None:
             said = "Open the address that the command printed: the key in it opens this page."
-            await _refuse(scope, send, HTTPStatus.FORBIDDEN, self._said(said))
+            await _refuse(scope, send, HTTPStatus.FORBIDDEN, self._answer_page(said))
         elif scope["path"] == SIGN_IN and scope["method"] == "POST":
             text = parse_qs((await _body(receive)).decode("utf-8", "replace")).get("password", [""])[0]
             if said := self.sign_in.refused("", text):
-                await _refuse(scope, send, HTTPStatus.FORBIDDEN, self._said(said, PASSWORD))
+                await _refuse(scope, send, HTTPStatus.FORBIDDEN, self._answer_page(said, PASSWORD))
             else:
                 await self._let_in(send)
         else:
-            await _refuse(scope, send, HTTPStatus.UNAUTHORIZED, self._said("", PASSWORD))
+            await _refuse(scope, send, HTTPStatus.UNAUTHORIZED, self._answer_page("", PASSWORD))
 
     async def _let_in(self, send: Send) -> None:
         cookie = f"{self.cookie}={self.sessions.begin()}; Path=/; HttpOnly; SameSite=Lax"
@@ -114,7 +114,7 @@ class Gate:
     async def _through(self, scope: Message, receive: Receive, send: Send, headers: dict[bytes, str]) -> None:
         if int(headers.get(b"content-length") or 0) > self.most_bytes:
             said = f"At most {self.most_bytes >> 20} MiB at once."
-            await _refuse(scope, send, HTTPStatus.REQUEST_ENTITY_TOO_LARGE, self._said(said))
+            await _refuse(scope, send, HTTPStatus.REQUEST_ENTITY_TOO_LARGE, self._answer_page(said))
             return
         read = 0
 
@@ -134,7 +134,7 @@ class Gate:
 
         await self.app(scope, count_body, with_headers)
 
-    def _said(self, said: str, form: str = "") -> bytes:
+    def _answer_page(self, said: str, form: str = "") -> bytes:
         return FORM.format(title=escape(self.title), said=escape(said), form=form).encode()
 
 

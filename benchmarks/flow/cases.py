@@ -16,7 +16,7 @@ from config.slave_file import SlaveFile
 from config.valve_file import load_valve, shipped_valve
 from positioner.control.requests import QUIET, Requests
 from positioner.control.settings import Settings
-from positioner.virtual.virtual_cycle import identified, virtual_cycle
+from positioner.virtual.virtual_cycle import run_identification, virtual_cycle
 from sim.slave.modbus_slave import device_of
 
 POSITIONERS = {"conventional": "conventional", "seed": "seed's law", "slides": "slides (ours)"}
@@ -83,7 +83,7 @@ def virtual_outcome(case: FlowCase, tuned: Callable[[Settings], Settings] = lamb
     daemon, slave = flow_files(case)
     first = Requests(mode=Mode.AUTOMATIC, mode_writes=1)
     cycle = virtual_cycle(daemon, device_of(slave, VALVE), first, tuned(Settings.of(daemon)))
-    for _ in identified(cycle, daemon.excitation.staircase_limit_s, wait=False):
+    for _ in run_identification(cycle, daemon.excitation.staircase_limit_s, wait=False):
         pass
     applied = cycle.snapshot.decision.applied
     if applied.ratios is None:

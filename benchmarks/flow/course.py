@@ -15,7 +15,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from positioner.daemon.health.travel_accumulator import TravelAccumulator
-from positioner.virtual.virtual_cycle import played
+from positioner.virtual.virtual_cycle import play_script
 
 if TYPE_CHECKING:
     from benchmarks.flow.loop import FlowLoop
@@ -73,7 +73,7 @@ def course_in(
         rows.append((time_s - begin_s, loop.flow, loop.reference_pu, stem_pu, pressure_pu))
         return cycle.requests
 
-    for _ in played(cycle, dcs, begin_s + duration_s):
+    for _ in play_script(cycle, dcs, begin_s + duration_s):
         pass
     return FlowCourse(*np.array(rows).T)
 

@@ -22,7 +22,7 @@ from config.slave_file import SlaveFile
 from config.valve_file import ValveFile
 from positioner.control.requests import QUIET, Requests
 from positioner.estimation import Applied, Estimates
-from positioner.virtual.virtual_cycle import played, virtual_cycle
+from positioner.virtual.virtual_cycle import play_script, virtual_cycle
 from sim.slave.simulated_device import Device
 from sim.valve import Valve
 
@@ -160,7 +160,7 @@ def run_scenario(file: ValveFile, noise: Noise, period_s: float) -> ScenarioRun:
 
     decided: list[tuple[float, float]] = []
     readings: list[Estimates] = []
-    for snapshot in played(cycle, ask, UNTIL_S - period_s / 2):
+    for snapshot in play_script(cycle, ask, UNTIL_S - period_s / 2):
         decision = snapshot.decision
         decided.append((decision.command_pa, decision.reference_m))
         if not readings or decision.estimates is not readings[-1]:

@@ -85,10 +85,10 @@ class ValveCommands:
     def set(self, role: Role, name: str, value: float) -> Confirmation:
         """Write a register; confirmed when it reads back so."""
 
-        def written(dcs: Dcs) -> Confirmation:
+        def write(dcs: Dcs) -> Confirmation:
             return _confirm(name, value, dcs.set_and_read_back(name, value))
 
-        return self._within_rights(role, (name,), written)
+        return self._within_rights(role, (name,), write)
 
     def set_mode(self, role: Role, mode: Mode) -> Confirmation:
         """Change who commands the pressure."""
@@ -105,7 +105,7 @@ class ValveCommands:
             goes: whether the stem goes there; else its own place is written first.
         """
 
-        def written(dcs: Dcs) -> Confirmation:
+        def write(dcs: Dcs) -> Confirmation:
             asked_pu = dcs.get("reference")
             if not abs(asked_pu - seen_pu) <= SAME_PU:
                 now, then = (_as_read("reference", each) for each in (asked_pu, seen_pu))
@@ -114,18 +114,18 @@ class ValveCommands:
             dcs.set_and_read_back("reference", to_pu)
             return _confirm("mode", Mode.AUTOMATIC, dcs.set_and_read_back("mode", Mode.AUTOMATIC))
 
-        return self._within_rights(role, ("reference", "mode"), written)
+        return self._within_rights(role, ("reference", "mode"), write)
 
     def manual(self, role: Role, pressure_pa: float) -> Confirmation:
         """Command a pressure by hand."""
 
-        def written(dcs: Dcs) -> Confirmation:
+        def write(dcs: Dcs) -> Confirmation:
             dcs.set_and_read_back("manual_pressure", pressure_pa)
             return _confirm("mode", Mode.MANUAL, dcs.set_and_read_back("mode", Mode.MANUAL))
 
         if problem := register_named("manual_pressure").problem_with(pressure_pa):
             return Confirmation(False, problem)
-        return self._within_rights(role, ("manual_pressure", "mode"), written)
+        return self._within_rights(role, ("manual_pressure", "mode"), write)
 
     def set_reference(self, role: Role, reference_pu: float) -> Confirmation:
         """Ask for a position; what is allowed is said in %, as it is typed."""
@@ -136,33 +136,33 @@ class ValveCommands:
     def acknowledge(self, role: Role) -> Confirmation:
         """Acknowledge a fault; confirmed when none is latched any more."""
 
-        def written(dcs: Dcs) -> Confirmation:
+        def write(dcs: Dcs) -> Confirmation:
             dcs.set_and_read_back("acknowledge", 1)
             fault = dcs.get("fault")
             gone = fault == Fault.NONE
             said = "no fault is latched any more" if gone else f"the fault stays: {code_text('fault', fault)}"
             return Confirmation(gone, f"acknowledged, {said}")
 
-        return self._within_rights(role, ("acknowledge",), written)
+        return self._within_rights(role, ("acknowledge",), write)
 
     def acknowledge_alarm(self, role: Role, cause: Ne107Cause) -> Confirmation:
         """Say that an alarm was seen."""
 
-        def written(dcs: Dcs) -> Confirmation:
+        def write(dcs: Dcs) -> Confirmation:
             dcs.set("alarm_acknowledge", cause)
             return Confirmation(True, f"acknowledged: {cause.text}")
 
-        return self._within_rights(role, ("alarm_acknowledge",), written)
+        return self._within_rights(role, ("alarm_acknowledge",), write)
 
     def shelve_alarm(self, role: Role, cause: Ne107Cause, for_s: float) -> Confirmation:
         """Put an alarm aside for a while, s; 0: show it again."""
 
-        def written(dcs: Dcs) -> Confirmation:
+        def write(dcs: Dcs) -> Confirmation:
             dcs.set_all({"alarm_shelve": cause, "alarm_shelve_time": for_s})
             what = f"shelved for {for_s / MINUTE_S:.3g} min" if for_s else "shown again"
             return Confirmation(True, f"{what}: {cause.text}")
 
-        return self._within_rights(role, ("alarm_shelve",), written)
+        return self._within_rights(role, ("alarm_shelve",), write)
 
     def identify(self, role: Role, excitation: Mapping[str, float], show: Callable[[float], None]) -> Confirmation:
         """Identify the valve, which moves it; returns when it is over. Refused where a permissive does not hold.

@@ -56,7 +56,7 @@ class Door:
         self.refused = self.sign_in.refused(name, password or "")
         return None if self.refused else User(role=UserRole.User, name=name)
 
-    def turned_away(self, peer: object, refusal: Refusal) -> ServiceError:
+    def turn_away(self, peer: object, refusal: Refusal) -> ServiceError:
         """Return what turns a client away, said in one line."""
         self.say(f"{_address(peer)} turned away: {refusal.text}")
         return ServiceError(getattr(ua.StatusCodes, refusal.status))
@@ -86,11 +86,11 @@ class GuardedServer(InternalServer):  # type: ignore[misc]  # asyncua's types ar
     async def _require_own_uri(self, certificate: x509.Certificate, description: ua.ApplicationDescription) -> None:
         """Require that the certificate is the application's that it says it is."""
         if refusal := self.door.keys.refusal(certificate):
-            raise self.door.turned_away("client", refusal)
+            raise self.door.turn_away("client", refusal)
         if description.ApplicationUri not in uris_in(certificate):
             named = ", ".join(uris_in(certificate)) or "nobody"
             said = f"its certificate names {named}, it says {description.ApplicationUri}"
-            raise self.door.turned_away("client", Refusal("BadCertificateUriInvalid", said))
+            raise self.door.turn_away("client", Refusal("BadCertificateUriInvalid", said))
 
 
 class GuardedSession(InternalSession):  # type: ignore[misc]  # the same
@@ -107,9 +107,9 @@ class GuardedSession(InternalSession):  # type: ignore[misc]  # the same
         door = self.iserver.door
         if not peer_certificate:
             refusal = Refusal("BadSecurityModeInsufficient", "its channel is not encrypted")
-            raise door.turned_away(self.name, refusal)
+            raise door.turn_away(self.name, refusal)
         if refused := door.keys.refusal(x509.load_der_x509_certificate(peer_certificate)):
-            raise door.turned_away(self.name, refused)
+            raise door.turn_away(self.name, refused)
         door.refused = "it asked to come in by other means than a password"
         try:
             return super().activate_session(params, peer_certificate)
@@ -136,9 +136,9 @@ class GuardedSession(InternalSession):  # type: ignore[misc]  # the same
 
     async def write(self, params: ua.WriteParameters) -> list[ua.StatusCode]:
         """Write the set points among them; nothing else can be written."""
-        return [await self._written(each) for each in params.NodesToWrite]
+        return [await self._write_one(each) for each in params.NodesToWrite]
 
-    async def _written(self, asked: ua.WriteValue) -> ua.StatusCode:
+    async def _write_one(self, asked: ua.WriteValue) -> ua.StatusCode:
         write = self.iserver.door.writes.get(asked.NodeId)
         if write is None or asked.AttributeId != ua.AttributeIds.Value:
             return ua.StatusCode(ua.StatusCodes.BadNotWritable)
@@ -151,9 +151,9 @@ class GuardedSession(InternalSession):  # type: ignore[misc]  # the same
 
     async def call(self, params: list[ua.CallMethodRequest]) -> list[ua.CallMethodResult]:
         """Call methods of valves; those of the server itself as asyncua has them."""
-        return [await self._called(each) for each in params]
+        return [await self._call_one(each) for each in params]
 
-    async def _called(self, asked: ua.CallMethodRequest) -> ua.CallMethodResult:
+    async def _call_one(self, asked: ua.CallMethodRequest) -> ua.CallMethodResult:
         found = self.iserver.door.methods.get((asked.ObjectId, asked.MethodId))
         if found is None:
             return (await super().call([asked]))[0]

@@ -81,7 +81,7 @@ class RecordedHistory(HistoryStorageInterface):  # type: ignore[misc]  # asyncua
         self, node_id: ua.NodeId, start: datetime | None, end: datetime | None, nb_values: int
     ) -> tuple[list[ua.DataValue], datetime | None]:
         """Return the values of a stretch, and from when on to go on."""
-        recorded = self._recorded(node_id)
+        recorded = self._find_recorded(node_id)
         stretch = _Stretch.between(start, end)
         chosen, further = stretch.cut(await _in_a_thread(_points, recorded, stretch.since_s), nb_values)
         return [_value(time_s, value, recorded.of) for time_s, value in chosen], further
@@ -90,12 +90,12 @@ class RecordedHistory(HistoryStorageInterface):  # type: ignore[misc]  # asyncua
         self, source_id: ua.NodeId, start: datetime | None, end: datetime | None, nb_values: int, _filter: object
     ) -> tuple[list[UaEvent], datetime | None]:
         """Return the events of a stretch, and from when on to go on."""
-        recorded = self._recorded(source_id)
+        recorded = self._find_recorded(source_id)
         stretch = _Stretch.between(start, end)
         chosen, further = stretch.cut(await _in_a_thread(_events, recorded, stretch.since_s), nb_values)
         return [event_of(event, source_id, self._event_type) for _, event in chosen], further
 
-    def _recorded(self, node_id: ua.NodeId) -> Recorded:
+    def _find_recorded(self, node_id: ua.NodeId) -> Recorded:
         if node_id not in self._nodes:
             raise ServiceError(ua.StatusCodes.BadHistoryOperationUnsupported)
         return self._nodes[node_id]

@@ -250,7 +250,7 @@ class Controls:
         ahead = await aside(self._ahead)
 
         async def identify() -> None:
-            await self.do(self._identified)
+            await self.do(self._begin_identification)
 
         answers = [Answer("Identify", "identify", identify)]
         self._question.ask("Identify: the valve moves", ahead.identification(), answers)
@@ -266,7 +266,7 @@ class Controls:
     def _acknowledge(self, role: Role) -> Confirmation:
         return self._valve.commands.acknowledge(role)
 
-    def _identified(self, role: Role) -> Confirmation:
+    def _begin_identification(self, role: Role) -> Confirmation:
         def show(progress: float) -> None:
             self._progress = progress
 

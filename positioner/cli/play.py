@@ -131,7 +131,7 @@ def _play_daemon(
 ) -> Run:
     """Let the daemon identify the valve, or give it the extended one, and follow the reference."""
     from positioner.control.settings import Settings
-    from positioner.virtual.virtual_cycle import identified, played, virtual_cycle
+    from positioner.virtual.virtual_cycle import play_script, run_identification, virtual_cycle
     from sim.slave.modbus_slave import device_of
 
     daemon, slave = _files(arguments, valve)
@@ -140,11 +140,11 @@ def _play_daemon(
     snapshots = [cycle.snapshot]
     if extended is None:
         within_s = daemon.excitation.staircase_limit_s if daemon.by_slides else IDENTIFY_S
-        snapshots = list(identified(cycle, within_s, wait=not daemon.by_slides))
+        snapshots = list(run_identification(cycle, within_s, wait=not daemon.by_slides))
     begin_s = snapshots[-1].sample.time_s
     ask = _script(time_s, reference_m, begin_s)
     stem_m = []
-    for snapshot in islice(played(cycle, ask, begin_s + float(time_s[-1] - time_s[0])), 1, None):
+    for snapshot in islice(play_script(cycle, ask, begin_s + float(time_s[-1] - time_s[0])), 1, None):
         snapshots.append(snapshot)
         stem_m.append(device.stem_m)
     return Run(snapshots, begin_s, stem_m)

@@ -61,7 +61,7 @@ def run(arguments: argparse.Namespace) -> int:
 
     file = checked(arguments)
     assert file is not None
-    asked, credit = _asked(arguments, file.valve.travel.closes), _credit(arguments)
+    asked, credit = _read_partial_stroke(arguments, file.valve.travel.closes), _credit(arguments)
     require_ready(file, arguments)
     valve, stroke_m = RunningValve(file, arguments), file.valve.stroke_m
     program = programme(asked, bounds_of(file), valve.command_pa(), valve.stem_m(), stroke_m, str(arguments.config))
@@ -79,7 +79,7 @@ def run(arguments: argparse.Namespace) -> int:
     return status
 
 
-def _asked(arguments: argparse.Namespace, closes: bool) -> "PartialStroke":
+def _read_partial_stroke(arguments: argparse.Namespace, closes: bool) -> "PartialStroke":
     from positioner.tests_on_the_valve.partial_stroke import PartialStroke
 
     more_air = None if arguments.towards is None else (arguments.towards == "open") is not closes

@@ -74,7 +74,7 @@ class HistoryFile:
         except OSError as error:
             raise InputError(str(folder), f"the history cannot be kept there: {error.strerror}") from None
         try:
-            self._connection = self._opened()
+            self._connection = self._open_file()
         except BaseException:
             os.close(self._lock)
             raise
@@ -154,7 +154,7 @@ class HistoryFile:
         except sqlite3.Error as error:
             raise HistoryFull(str(error)) from None
 
-    def _opened(self) -> sqlite3.Connection:
+    def _open_file(self) -> sqlite3.Connection:
         try:
             if not self.path.exists():
                 _make(self.path)
@@ -163,7 +163,7 @@ class HistoryFile:
             raise InputError(str(self.path), f"the history cannot be kept there: {error}") from None
         except sqlite3.DatabaseError as error:
             self._put_aside(str(error))
-        return self._opened()
+        return self._open_file()
 
     def _put_aside(self, reason: str) -> None:
         """Give a damaged file another name, with its log."""

@@ -76,7 +76,7 @@ class ResponseFigures(Result):
             _label_figure("static gain", self.static_gain, 1.0, gain_unit),
             _label_figure("dead band", self.dead_band, scale, unit),
             _label_figure("resolution", self.resolution, scale, unit),
-            *self._undetermined(),
+            *self._explain_missing(),
             *notes,
         ]
 
@@ -105,7 +105,7 @@ class ResponseFigures(Result):
             rows.append((which, "", "", "", *values))
         return Table(headings, rows)
 
-    def _undetermined(self) -> Iterator[str]:
+    def _explain_missing(self) -> Iterator[str]:
         """Yield why figures are missing, each reason once, with its steps and figures."""
         reasons: dict[str, dict[str, list[int]]] = {}
         for number, step in enumerate(self.steps, start=1):

@@ -72,7 +72,7 @@ def device_calls(port: int) -> Calls:
     driver = driver_for(ModbusTcpDevice(host=HOST, port=port, reply_timeout_s=AGENT_WITHIN_S))
     connected: list[float] = []
 
-    def asked(what: Callable[[], Any]) -> Any:
+    def ask(what: Callable[[], Any]) -> Any:
         if not connected:
             connected.append(driver.open())
         try:
@@ -83,8 +83,8 @@ def device_calls(port: int) -> Calls:
             raise
 
     return {
-        "read": lambda: asked(lambda: asdict(driver.read())),
-        "exchange": lambda command_pa: asked(lambda: asdict(driver.exchange(command_pa))),
+        "read": lambda: ask(lambda: asdict(driver.read())),
+        "exchange": lambda command_pa: ask(lambda: asdict(driver.exchange(command_pa))),
     }
 
 

@@ -43,7 +43,7 @@ class Forked:
         Raises:
             subprocess.TimeoutExpired: it has not within that time, s.
         """
-        if self._number and not self._server.asked({"wait": self._number, "within_s": timeout}):
+        if self._number and not self._server.ask({"wait": self._number, "within_s": timeout}):
             raise subprocess.TimeoutExpired(str(self._number), timeout)
         self._number = 0
 
@@ -71,12 +71,12 @@ class ForkServer:
         its_in, our_out = os.pipe()
         our_in, its_out = os.pipe()
         request = {"module": module, "words": words, "environment": dict(environment), "folder": os.getcwd()}
-        number = self.asked(request, (its_in, its_out, error.fileno()))
+        number = self.ask(request, (its_in, its_out, error.fileno()))
         for each in (its_in, its_out):
             os.close(each)
         return Forked(self, number, os.fdopen(our_out, "w"), os.fdopen(our_in))
 
-    def asked(self, request: Mapping[str, Any], descriptors: Sequence[int] = ()) -> int:
+    def ask(self, request: Mapping[str, Any], descriptors: Sequence[int] = ()) -> int:
         """Return the answer to a request."""
         text = json.dumps(request).encode()
         with self._one_at_a_time:

@@ -60,7 +60,7 @@ def lockstep_cycle(
     return Cycle(link, controller, pace, requests, recorder=None, health=health)
 
 
-def identified(cycle: Cycle, within_s: float, *, wait: bool) -> Iterator[Snapshot]:
+def run_identification(cycle: Cycle, within_s: float, *, wait: bool) -> Iterator[Snapshot]:
     """Yield the snapshots of an identification: eta switches it on until it is complete, or has come to nothing.
 
     Args:
@@ -73,14 +73,14 @@ def identified(cycle: Cycle, within_s: float, *, wait: bool) -> Iterator[Snapsho
         return replace(requests, eta=QUIET if snapshot.decision.progress >= 1 else (0, 0, 0))
 
     before = cycle.snapshot.decision.applied
-    for snapshot in played(cycle, ask, cycle.snapshot.sample.time_s + within_s):
+    for snapshot in play_script(cycle, ask, cycle.snapshot.sample.time_s + within_s):
         yield snapshot
         applied = snapshot.decision.applied
         if (applied.count, applied.refusals) != (before.count, before.refusals) and not wait:
             return
 
 
-def played(cycle: Cycle, script: Script, until_s: float) -> Iterator[Snapshot]:
+def play_script(cycle: Cycle, script: Script, until_s: float) -> Iterator[Snapshot]:
     """Yield the snapshot of every cycle up to a time of the device, s, the script playing the DCS between them."""
     yield cycle.snapshot
     while cycle.snapshot.sample.time_s < until_s:

@@ -39,7 +39,7 @@ def _apart(effects: Sequence[Effect]) -> list[str]:
     return [f"- {', '.join(each)}: {how}" for how, each in pairs.items()]
 
 
-def renewed(document: str) -> str:
+def renew_catalogue(document: str) -> str:
     """Return a document with the catalogue between its marks."""
     head, _, rest = document.partition(BEGIN)
     _, _, tail = rest.partition(END)
@@ -70,6 +70,6 @@ def _line(key: str, parameter: Parameter) -> str:
 
 if __name__ == "__main__":
     for path in [Path(text) for text in sys.argv[1:]]:
-        path.write_text(renewed(path.read_text(encoding="utf-8")), encoding="utf-8")
+        path.write_text(renew_catalogue(path.read_text(encoding="utf-8")), encoding="utf-8")
     if not sys.argv[1:]:
         print(catalogue())

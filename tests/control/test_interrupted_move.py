@@ -18,7 +18,7 @@ from drivers.in_memory import MemoryDriver
 from positioner.control.controller_memory import Decision
 from positioner.control.requests import QUIET, Requests
 from positioner.daemon.cycle import Cycle
-from positioner.virtual.virtual_cycle import identified, lockstep_cycle
+from positioner.virtual.virtual_cycle import lockstep_cycle, run_identification
 from sim.effect import FINE_STEP_S
 from sim.slave.simulated_device import Device
 from sim.valve import Valve
@@ -90,7 +90,7 @@ class Loop:
         self.driver = FaultyDriver(self.device)
         first = Requests(mode=Mode.AUTOMATIC, mode_writes=1)
         self.cycle: Cycle = lockstep_cycle(DaemonFile.model_validate(daemon), self.driver, first)
-        for _ in identified(self.cycle, 120.0, wait=False):
+        for _ in run_identification(self.cycle, 120.0, wait=False):
             pass
         self.ask(eta=QUIET)
         self.step_to(STILL)

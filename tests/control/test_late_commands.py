@@ -16,7 +16,7 @@ from positioner.control.controller_memory import Decision
 from positioner.control.requests import Requests
 from positioner.estimation.batch import BatchResult
 from positioner.estimation.refiner import InProcessRefiner
-from positioner.virtual.virtual_cycle import identified, virtual_cycle
+from positioner.virtual.virtual_cycle import run_identification, virtual_cycle
 from sim.slave.simulated_device import Device
 from sim.valve import Valve
 
@@ -49,7 +49,7 @@ def identified_when_late(periods: int) -> Decision:
     valve.rest_at(0.0, 0.0)
     first = Requests(mode=Mode.AUTOMATIC, mode_writes=1, alpha_pa=44126.0, beta_pa=13238.0)
     cycle = virtual_cycle(daemon, Late(Device(valve, slave, {}), periods), first)
-    for _ in identified(cycle, 5.0, wait=False):
+    for _ in run_identification(cycle, 5.0, wait=False):
         pass
     return cycle.snapshot.decision
 

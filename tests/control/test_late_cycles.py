@@ -10,7 +10,7 @@ from config.codes import Mode, Refusal
 from config.daemon_file import DaemonFile
 from positioner.control.requests import Requests
 from positioner.daemon.cycle import Cycle
-from positioner.virtual.virtual_cycle import identified, virtual_cycle
+from positioner.virtual.virtual_cycle import run_identification, virtual_cycle
 from tests.cases import few_always
 from tests.control.other_plant import SEED_LIKE, OtherPlant, with_friction
 
@@ -60,7 +60,7 @@ def begun(share: float, seed: int) -> Cycle:
 @pytest.mark.parametrize("seed", few_always([0, 3, 1, 2, 4, 5, 6, 7], 2))
 def test_an_aged_packing_is_identified_by_late_cycles(seed: int, share: float) -> None:
     cycle = begun(share, seed)
-    for _ in identified(cycle, 5.0, wait=False):
+    for _ in run_identification(cycle, 5.0, wait=False):
         pass
     applied, estimates = cycle.snapshot.decision.applied, cycle.snapshot.decision.estimates
     assert applied.ratios is not None, applied.last_refusal.name

@@ -21,7 +21,7 @@ from positioner.control.sample import Sample
 from positioner.control.settings import Settings
 from positioner.estimation.landings.landing_detector import SlideOutcome
 from positioner.estimation.landings.static_identification import StaticIdentification
-from positioner.virtual.virtual_cycle import identified, lockstep_cycle
+from positioner.virtual.virtual_cycle import lockstep_cycle, run_identification
 from sim.slave.simulated_device import Device
 from sim.valve import Valve
 
@@ -66,7 +66,7 @@ def device() -> Device:
 def landings_of(driver: MemoryDriver) -> int:
     """Return how many landings the static law rests on when S3 ends."""
     cycle = lockstep_cycle(DaemonFile.model_validate(DAEMON), driver, Requests(mode=Mode.AUTOMATIC, mode_writes=1))
-    *_, last = identified(cycle, 60.0, wait=False)
+    *_, last = run_identification(cycle, 60.0, wait=False)
     assert last.decision.applied.count == 1, last.decision.applied
     return last.decision.static_law.landings
 

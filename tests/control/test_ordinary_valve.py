@@ -20,7 +20,7 @@ from positioner.control.requests import QUIET, Requests
 from positioner.daemon.cycle import Cycle
 from positioner.daemon.snapshot import Snapshot
 from positioner.estimation.landings.static_law import StaticLaw
-from positioner.virtual.virtual_cycle import identified, played, virtual_cycle
+from positioner.virtual.virtual_cycle import play_script, run_identification, virtual_cycle
 from sim.effect import FINE_STEP_S
 from sim.slave.simulated_device import Device
 from sim.valve import Valve
@@ -82,7 +82,7 @@ class Loop:
         self.valve.rest_at(initial.position_m, initial.pressure_pa)
         device = WholeMillibars(Device(self.valve, file, {}))
         self.cycle: Cycle = virtual_cycle(daemon_file(**control), device, Requests(mode=Mode.AUTOMATIC, mode_writes=1))
-        self.staircase = list(identified(self.cycle, 60.0, wait=False))
+        self.staircase = list(run_identification(self.cycle, 60.0, wait=False))
 
     @property
     def law(self) -> StaticLaw:
@@ -96,7 +96,7 @@ class Loop:
             writes = requests.reference_writes + int(new)
             return replace(requests, eta=QUIET, reference_m=reference_m, reference_writes=writes)
 
-        return list(played(self.cycle, ask, self.cycle.snapshot.sample.time_s + STEP_S))
+        return list(play_script(self.cycle, ask, self.cycle.snapshot.sample.time_s + STEP_S))
 
 
 def references_m(seed: int) -> Iterator[float]:

@@ -21,7 +21,7 @@ from positioner.control.sample import Sample
 from positioner.control.settings import Settings
 from positioner.daemon.snapshot import Snapshot
 from positioner.estimation.refiner import Refinement
-from positioner.virtual.virtual_cycle import played, virtual_cycle
+from positioner.virtual.virtual_cycle import play_script, virtual_cycle
 from sim.slave.modbus_slave import device_of
 
 STROKE_M = 0.1016
@@ -58,7 +58,7 @@ def inputs(law: str) -> tuple[tuple[Sample, Requests], ...]:
         writes = int(2.0 * snapshot.sample.time_s)
         return replace(requests, eta=QUIET, reference_m=(0.3 + 0.2 * (writes % 3)) * STROKE_M, reference_writes=writes)
 
-    for _ in played(cycle, dcs, 3.0):
+    for _ in play_script(cycle, dcs, 3.0):
         pass
     return tuple(given)
 

@@ -19,7 +19,7 @@ from positioner.control.valve_knowledge import ValveKnowledge
 from positioner.daemon.cycle import Cycle
 from positioner.daemon.memory.conditions import changed, conditions_of
 from positioner.estimation.acceptance import Ratios
-from positioner.virtual.virtual_cycle import identified, virtual_cycle
+from positioner.virtual.virtual_cycle import run_identification, virtual_cycle
 from sim.effect import FINE_STEP_S
 from sim.slave.simulated_device import Device
 from sim.static_inverse import extended_valve
@@ -90,7 +90,7 @@ class Bench:
         self.cycle.requests = replace(self.cycle.requests, **values)
 
     def identify(self) -> None:
-        for _ in identified(self.cycle, 120.0, wait=False):
+        for _ in run_identification(self.cycle, 120.0, wait=False):
             pass
         self.ask(eta=QUIET)
         self.run(0.1)

@@ -11,7 +11,7 @@ from config.daemon_file import DaemonFile
 from positioner.control.controller_memory import Decision
 from positioner.control.requests import Requests
 from positioner.control.settings import Settings
-from positioner.virtual.virtual_cycle import identified, virtual_cycle
+from positioner.virtual.virtual_cycle import run_identification, virtual_cycle
 from tests.cases import few_always
 from tests.control.other_plant import SEED_LIKE, OtherPlant
 from tests.other_device import Parameters
@@ -97,7 +97,7 @@ def excited(
     cycle = virtual_cycle(file, TakenLate(device) if said is AFTER else device, first, settings)
     for _ in range(round(0.4 / period_s)):
         cycle.once()
-    for _ in identified(cycle, 5.0, wait=False):
+    for _ in run_identification(cycle, 5.0, wait=False):
         pass
     return cycle.snapshot.decision
 

@@ -18,7 +18,7 @@ from positioner.control.laws.slides.slide_memory import SlideMemory
 from positioner.control.requests import Requests
 from positioner.daemon.health import Health, ne107_condition
 from positioner.daemon.health.valve_health import HealthSettings
-from positioner.virtual.virtual_cycle import identified, virtual_cycle
+from positioner.virtual.virtual_cycle import run_identification, virtual_cycle
 from sim.effect import FINE_STEP_S
 from sim.slave.simulated_device import Device
 from sim.valve import Valve
@@ -77,7 +77,7 @@ class Loop:
         self.cycle.requests = replace(self.cycle.requests, **values)
 
     def identify(self, within_s: float = 600.0) -> None:
-        for _ in identified(self.cycle, within_s, wait=False):
+        for _ in run_identification(self.cycle, within_s, wait=False):
             pass
 
     def step_to(self, reference_pu: float, cycles: int = 150) -> np.ndarray:

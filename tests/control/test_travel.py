@@ -20,7 +20,7 @@ from positioner.control.travel.dead_band import DeadBand
 from positioner.control.travel.signal_path import SignalPath
 from positioner.estimation.acceptance import Ratios
 from positioner.estimation.estimates import Estimate, no_estimate
-from positioner.virtual.virtual_cycle import identified, virtual_cycle
+from positioner.virtual.virtual_cycle import run_identification, virtual_cycle
 from sim.slave.modbus_slave import device_of
 from tests.daemon.test_supervisory_registers import Panel
 
@@ -230,7 +230,7 @@ def hunting(dead_band: float | str) -> tuple[float, float]:
     }
     device = device_of(SlaveFile.model_validate(slave), shipped_valve("seed"))
     cycle = virtual_cycle(DaemonFile.model_validate(tables), device, Requests(mode=Mode.AUTOMATIC, mode_writes=1))
-    list(identified(cycle, 600.0, wait=False))
+    list(run_identification(cycle, 600.0, wait=False))
     assert cycle.health is not None
     cycle.requests = replace(cycle.requests, eta=QUIET, reference_m=0.05, reference_writes=1)
     for _ in range(500):

@@ -14,7 +14,7 @@ from config.valve_file import shipped_valve
 from positioner.control.requests import Requests
 from positioner.daemon.memory.conditions import conditions_of
 from positioner.daemon.supervisory_registers import SupervisoryRegisters
-from positioner.virtual.virtual_cycle import identified, virtual_cycle
+from positioner.virtual.virtual_cycle import run_identification, virtual_cycle
 from sim.slave.modbus_slave import device_of
 
 PROFILES = SHIPPED / "profiles"
@@ -54,7 +54,7 @@ class AirToClose:
 def valve() -> AirToClose:
     valve = AirToClose()
     valve.set("mode", Mode.AUTOMATIC)
-    list(identified(valve.cycle, 600.0, wait=False))
+    list(run_identification(valve.cycle, 600.0, wait=False))
     valve.cycle.requests = replace(valve.cycle.requests, eta=(1, 1, 1))
     assert valve.cycle.snapshot.decision.applied.count == 1
     return valve

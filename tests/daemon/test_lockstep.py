@@ -22,7 +22,7 @@ from positioner.daemon.pacing import DevicePace
 from positioner.daemon.recorder import Recorder
 from positioner.daemon.snapshot import Snapshot
 from positioner.estimation.refiner import InProcessRefiner
-from positioner.virtual.virtual_cycle import played, virtual_cycle
+from positioner.virtual.virtual_cycle import play_script, virtual_cycle
 from sim.slave.modbus_slave import device_of
 from tests.children import running
 
@@ -53,7 +53,7 @@ def recorded(folder: Path) -> list[str]:
         recorder = Recorder(folder / "recordings", "v", 10_000_000, 2)
         cycle = Cycle(link, Controller(Settings.of(DAEMON), held_pa, InProcessRefiner()), pace, EXCITED, recorder)
         recorder.start()
-        for _ in played(cycle, dcs, 1.8):
+        for _ in play_script(cycle, dcs, 1.8):
             pass
         recorder.stop()
         link.release()
@@ -77,7 +77,7 @@ def test_the_bus_changes_nothing_but_float32_rounding(over_tcp: list[str]) -> No
     """The same device in memory: what the wire rounds is all that differs."""
     slave = SlaveFile.model_validate(tomllib.loads(SLAVE))
     cycle = virtual_cycle(DAEMON, device_of(slave, shipped_valve("seed")), EXCITED)
-    in_memory = [snapshot.sample.position_m for snapshot in played(cycle, dcs, 1.8)]
+    in_memory = [snapshot.sample.position_m for snapshot in play_script(cycle, dcs, 1.8)]
     measured_m = [float(line.split(",")[2]) for line in over_tcp[1:]]
     assert len(in_memory) == len(measured_m)
     assert max(abs(a - b) for a, b in zip(in_memory, measured_m, strict=True)) < 1e-6

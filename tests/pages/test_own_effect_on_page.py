@@ -9,7 +9,7 @@ import pytest
 from config.errors import InputError
 from config.valve_file import valve
 from sim.effect import FOLDERS_ALLOWED, find_effect
-from sim.own_effect import EXAMPLE, checked
+from sim.own_effect import EXAMPLE, check_effect
 from tests.cli.test_daemon_process import until
 from tests.pages.laid_out import hidden
 from workbench.page.background import Finished, News, Progressed, Work
@@ -51,13 +51,13 @@ def test_what_is_wrong_is_said_with_its_line(right: str, wrong: str, said: str, 
     path = tmp_path / "own.py"
     path.write_text(TEXT.replace(right, wrong))
     with pytest.raises(InputError, match=said):
-        checked(path, valve("seed").valve)
+        check_effect(path, valve("seed").valve)
 
 
 def test_a_shipped_effects_name_is_taken(tmp_path: Path) -> None:
     (tmp_path / "backlash.py").write_text(TEXT)
     with pytest.raises(InputError, match="choose another"):
-        checked(tmp_path / "backlash.py", valve("seed").valve)
+        check_effect(tmp_path / "backlash.py", valve("seed").valve)
 
 
 def end_of(work: Work) -> News:

@@ -10,7 +10,7 @@ from config.errors import InputError
 from config.valve_file import ValveParameters, load_valve, shipped_valve
 from sim.composition import BASE, Composition
 from sim.effect import Effect, Parameter, find_effect, read_effect, scale_of
-from sim.effects.__main__ import renewed, unit
+from sim.effects.__main__ import renew_catalogue, unit
 from sim.open_loop import respond
 from sim.valve import Valve
 from tests.sim.library import EFFECTS, SEED, Series, library, plain, theta_with
@@ -233,7 +233,7 @@ def test_an_effect_without_starts_can_be_simulated_but_not_fitted(tmp_path: Path
 
 def test_the_document_has_the_catalogue_of_today() -> None:
     document = DOCUMENT.read_text(encoding="utf-8")
-    assert document == renewed(document), "stale: run python -m sim.effects docs/effects.md"
+    assert document == renew_catalogue(document), "stale: run python -m sim.effects docs/effects.md"
     for name in EFFECTS:
         assert f"### {name}\n" in document
 

@@ -14,7 +14,7 @@ from positioner.cli.parts.next_step import by_pressure_command, extend_command
 from sim.effect import shipped_effect, shipped_effects
 from tests.cases import few_always
 from workbench.blind.hiding import Hidden, hide
-from workbench.data.held_out import joined
+from workbench.data.held_out import join_recordings
 from workbench.diagnosis.diagnosis import diagnose
 from workbench.diagnosis.extension import extend
 from workbench.discriminate.measured_pressure import race_by_pressure
@@ -43,7 +43,7 @@ def test_by_its_pressure_one_effect_is_named_of_two(bowed: Hidden) -> None:
 
 @pytest.fixture(scope="module")
 def fits(bowed: Hidden) -> dict[str, Fit]:
-    whole = joined([bowed.fit, bowed.test])
+    whole = join_recordings([bowed.fit, bowed.test])
     base = fit(whole, bowed.base)
     return {name: fit(whole, bowed.base, effects=(name,), base=base) for name in RIVALS}
 

@@ -28,7 +28,7 @@ from workbench.discriminate.experiment_design import (
     DesignedExperiment,
     Leg,
     Terms,
-    told_apart,
+    tells_apart,
 )
 from workbench.discriminate.rival_race import ASKED, RivalRace, Weighed, evidence
 from workbench.fit.fit_result import Fit
@@ -96,14 +96,14 @@ def test_where_events_speak_against_what_all_residuals_say_nothing_is_said() -> 
 
 
 def test_the_moves_of_a_course_are_the_times_its_command_sets_out() -> None:
-    way = np.sign(np.diff(COURSE.sampled(PERIOD_S)[1]))
+    way = np.sign(np.diff(COURSE.sample_every(PERIOD_S)[1]))
     assert np.sum((way != 0) & (way != np.concatenate([[0], way[:-1]]))) == COURSE.moves == 2
 
 
 def test_a_course_stays_inside_its_bounds() -> None:
     wild = Course("wild", 200e3, (Leg(-50e3, 0.0, 60.0), Leg(100e3, 1.0, 60.0)))
     tame = wild.within(BOUNDS)
-    time_s, command_pa = tame.sampled(1e-3)
+    time_s, command_pa = tame.sample_every(1e-3)
     assert command_pa.min() >= BOUNDS.minimum_pa
     assert command_pa.max() <= BOUNDS.maximum_pa
     assert tame.duration_s <= BOUNDS.longest_s * (1 + 1e-9)
@@ -112,8 +112,8 @@ def test_a_course_stays_inside_its_bounds() -> None:
 
 def test_a_pair_that_no_course_tells_apart_is_left_out_unless_there_is_no_other() -> None:
     rated = np.array([[0.2, 0.0005, -0.3], [-0.1, 0.0, 0.002]])
-    assert told_apart(rated, 1e-3).tolist() == [True, False, True]
-    assert told_apart(rated[:, 1:2], 1e-3).tolist() == [True]
+    assert tells_apart(rated, 1e-3).tolist() == [True, False, True]
+    assert tells_apart(rated[:, 1:2], 1e-3).tolist() == [True]
 
 
 def test_an_experiment_is_designed_for_the_likeliest(
@@ -130,7 +130,7 @@ def test_an_experiment_is_designed_for_the_likeliest(
 def answer_of(valve: ValveFile, chosen: DesignedExperiment) -> Played:
     """Let a valve answer."""
     composition = Composition.from_file(valve)
-    time_s, command_pa = chosen.course.sampled(PERIOD_S)
+    time_s, command_pa = chosen.course.sample_every(PERIOD_S)
     response = respond(composition, composition.theta, command_pa[:-1], PERIOD_S)
     noise_m = 5e-5 * np.random.default_rng(chosen.course.moves).standard_normal(time_s.size)
     columns = {"time_s": time_s, "command_pa": command_pa, "position_m": response.indicated_m + noise_m}

@@ -13,7 +13,7 @@ from config.recording import Recording
 from sim.effect import shipped_effect, shipped_effects
 from tests.workbench.hand_made import FITTED_EVENTS, FLOOR_M, errors_of, fit_of, model_of
 from tests.workbench.valves import SEED, record_of
-from workbench.data.held_out import joined, residual_m, split
+from workbench.data.held_out import join_recordings, residual_m, split
 from workbench.data.record import ready
 from workbench.diagnosis.verdict_sentence import reduction_sentence
 from workbench.fit.fit_result import Term
@@ -246,7 +246,7 @@ def test_another_recording_is_held_out_whole() -> None:
 def test_recordings_one_after_another_begin_anew_and_keep_what_all_have() -> None:
     one, other = moving(300), moving(200, seed=9)
     extra = Recording({**one.columns, "pressure_pa": one.command_pa})
-    whole = joined([extra, other])
+    whole = join_recordings([extra, other])
     assert set(whole.columns) == {"time_s", "command_pa", "position_m"}
     assert ready(whole).segments == ((0, 300), (300, 500))
 

@@ -49,7 +49,7 @@ class _Answer(BaseModel):
     files: dict[Literal["fit.csv", "test.csv", "valve.toml"], str]
 
     @model_validator(mode="after")
-    def _named(self) -> Self:
+    def _check_named(self) -> Self:
         for table in (*self.effects, self.valve):
             if not isinstance(table.get("name"), str) or any(
                 isinstance(table[key], str) for key in {*table} - {"name"}

@@ -33,9 +33,9 @@ from workbench.compare.residuals import (
     profile,
     spectrum,
 )
-from workbench.compare.slip_matching import SlipEvents, matched
+from workbench.compare.slip_matching import SlipEvents, match_slips
 from workbench.data.motion import velocity_m_per_s
-from workbench.data.noise_floor import told
+from workbench.data.noise_floor import say_m
 from workbench.data.record import Record, ready, require_units
 from workbench.model.free_run import FreeRun, Run
 
@@ -132,7 +132,7 @@ class Comparison(Result):
         length = self.own.length
         return [
             f"{self._judgement}: fit {self.fit_percent:.2f} %, error {length.said(self.rms_m, '.4g')} rms, "
-            f"{length.said(self.robust_m, '.4g')} robust, noise {told(self.noise_m, length)}"
+            f"{length.said(self.robust_m, '.4g')} robust, noise {say_m(self.noise_m, length)}"
             + ("" if self.repeatability_m is None else f", repeatability {length.said(self.repeatability_m, '.4g')}"),
             *(f"  {sentence}" for sentence in self.sentences),
             _phase_table(self.phases, length),
@@ -322,7 +322,7 @@ def _segment_findings(valve: ValveFile, record: Record, run: Run, first: int, en
     ]
     return _SegmentFindings(
         measured,
-        matched(time_s - record.time_s[0], (measured, measured_m), (simulated, simulated_m), record.scale_m),
+        match_slips(time_s - record.time_s[0], (measured, measured_m), (simulated, simulated_m), record.scale_m),
         phases(measured_m, measured, valve),
         direction,
         velocity_m_per_s(time_s, measured_m),

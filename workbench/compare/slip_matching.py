@@ -43,7 +43,7 @@ class SlipEvents(Brief):
     spurious_s: tuple[float, ...] = field(metadata={"json": "invented_s"})
 
 
-def matched(
+def match_slips(
     time_s: Column,
     measured: tuple[Sequence[Slip], Column],
     simulated: tuple[Sequence[Slip], Column],

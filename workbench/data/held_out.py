@@ -100,7 +100,7 @@ def split(recordings: Sequence[Recording], test: Recording | None = None) -> Spl
     Raises:
         InputError: no recording, too few samples, more than can be fitted, or what is held out is fitted as well.
     """
-    whole = joined(recordings)
+    whole = join_recordings(recordings)
     require_few_samples(whole)
     whole = informative(whole)
     if test:
@@ -153,7 +153,7 @@ def residual_m(part: Part, simulated_m: Column) -> Column:
     return np.where(part.counted, simulated_m - part.record.position_m, np.nan)
 
 
-def joined(recordings: Sequence[Recording]) -> Recording:
+def join_recordings(recordings: Sequence[Recording]) -> Recording:
     """Return the recordings one after another, with the columns that all of them have.
 
     Raises:

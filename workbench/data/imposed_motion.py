@@ -138,10 +138,10 @@ def rows_of(recordings: list[Recording], valve: ValveParameters) -> Rows:
     """
     if not recordings:
         raise InputError("recording", "none is given")
-    parts = [_curve(each) if "branch" in each.columns else _moved(each, valve) for each in recordings]
+    parts = [_curve(each) if "branch" in each.columns else _from_first_motion(each, valve) for each in recordings]
     if len({part.load_n is None for part in parts}) > 1:
         raise InputError("recording", "bench recordings and static curves cannot be balanced together")
-    rows = parts[0] if len(parts) == 1 else _joined(parts)
+    rows = parts[0] if len(parts) == 1 else _join(parts)
     if len(rows) < BALANCE_ROWS:
         raise InputError("recording", f"{len(rows)} rows with a known direction, at least {BALANCE_ROWS} are needed")
     if np.unique(rows.direction).size < 2:
@@ -199,7 +199,7 @@ def _curve(recording: Recording) -> Rows:
     )
 
 
-def _moved(recording: Recording, valve: ValveParameters) -> Rows:
+def _from_first_motion(recording: Recording, valve: ValveParameters) -> Rows:
     """Return the rows from the first motion on."""
     from scipy.signal import savgol_filter  # takes as long to load as all else together
 
@@ -242,7 +242,7 @@ def _require_columns(recording: Recording, names: tuple[str, ...]) -> None:
             raise InputError("recording", f"column {name} is missing; a balance of forces needs it; there are: {there}")
 
 
-def _joined(parts: list[Rows]) -> Rows:
+def _join(parts: list[Rows]) -> Rows:
     def all_of(name: str) -> Column | None:
         columns = [getattr(part, name) for part in parts]
         return None if columns[0] is None else np.concatenate(columns)

@@ -41,7 +41,7 @@ UNKNOWN = (
 )
 
 
-def told(value_m: float | None, length: Scale) -> str:
+def say_m(value_m: float | None, length: Scale) -> str:
     """Say a noise or a floor, in the unit in which lengths are read."""
     return "unknown" if value_m is None else length.said(value_m, ".4g")
 

@@ -201,10 +201,10 @@ def _from_rest(record: Record, notes: list[str]) -> Iterator[tuple[int, int]]:
     for first, end in record.segments:
         position_m = np.where(record.valid, record.position_m, np.nan)[first:end]
         measured = record.pressure_pa is not None or record.load_n is not None
-        rest = rests_first(position_m, record.scale_m, 0 if measured else _unchanged(record, first, end))
+        rest = rests_first(position_m, record.scale_m, 0 if measured else _count_unchanged(record, first, end))
         if rest:
             # What creeps within the noise looks like rest: the later, the less is left of it.
-            latest = rest + _unchanged(record, first + rest, end) - AT_ONCE
+            latest = rest + _count_unchanged(record, first + rest, end) - AT_ONCE
             rest = latest if rest < latest <= LATEST_REST * (end - first) else rest
         if rest is None or rest > LATEST_REST * (end - first) or end - first - rest < SHORTEST:
             yield first, end
@@ -217,7 +217,7 @@ def _from_rest(record: Record, notes: list[str]) -> Iterator[tuple[int, int]]:
         yield first + rest, end
 
 
-def _unchanged(record: Record, first: int, end: int) -> int:
+def _count_unchanged(record: Record, first: int, end: int) -> int:
     """Return for how many samples the command stays what it is at the first."""
     changed = np.flatnonzero(record.command_pa[first:end] != record.command_pa[first])
     return int(changed[0]) if changed.size else end - first

@@ -18,7 +18,7 @@ from config.valve_file import ValveFile
 from sim.effect import Effect, find_effect, find_effects, tried_effects
 from workbench.compare.comparison_sentences import shorten_notes
 from workbench.data.held_out import Split, split
-from workbench.data.noise_floor import UNKNOWN, told
+from workbench.data.noise_floor import UNKNOWN, say_m
 from workbench.diagnosis.as_given import AsGiven
 from workbench.diagnosis.by_command import ByCommand, by_command
 from workbench.diagnosis.judged_landings import judged_landings
@@ -165,7 +165,7 @@ class Diagnosis(Result, ForwardSelection[EvaluatedModel, EffectCandidate]):
             errors = step.before.errors
             title = (
                 f"step {number}: error {length.said(errors.train_rmse_m, '.4g')} rms fitted, "
-                f"{length.number(errors.test_rmse_m, '.4g')} held out, floor {told(self.split.floor_m, length)}"
+                f"{length.number(errors.test_rmse_m, '.4g')} held out, floor {say_m(self.split.floor_m, length)}"
             )
             said.append(candidate_table([each.tried for each in step.candidates], lengths(self.kind), title))
         if self.experiment:

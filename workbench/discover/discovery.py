@@ -19,7 +19,7 @@ from config.results.block import Block
 from config.results.result import Result
 from config.valve_file import ValveFile
 from workbench.data.held_out import Split, split
-from workbench.data.noise_floor import told
+from workbench.data.noise_floor import say_m
 from workbench.discover.added_force import Landing, landings
 from workbench.discover.form_search import search_forms
 from workbench.discover.found_form import FoundForm
@@ -52,7 +52,7 @@ class Discovery(Result):
     def sentence(self) -> str:
         """What was found, in one sentence."""
         length = self.base.fit.kind.length
-        floor = told(self.split.floor_m, length)
+        floor = say_m(self.split.floor_m, length)
         match self.outcome:
             case "explained":
                 return "nothing is left to explain: the valve as it is, refitted, is at the floor; no form is sought"
@@ -79,7 +79,7 @@ class Discovery(Result):
         errors, kind = self.base.errors, self.base.fit.kind
         title = (
             f"without: error {kind.length.said(errors.train_rmse_m, '.4g')} rms fitted, "
-            f"{kind.length.number(errors.test_rmse_m, '.4g')} held out, floor {told(self.split.floor_m, kind.length)}"
+            f"{kind.length.number(errors.test_rmse_m, '.4g')} held out, floor {say_m(self.split.floor_m, kind.length)}"
         )
         said: list[Block] = [self.sentence]
         for each in self.found[:1]:

@@ -100,20 +100,20 @@ class FormSearch:
         )
         on_proposal(tuple(self.forms[each.name].name for each in order))
         models: dict[str, EvaluatedModel | str] = {}
-        step = self._judged(models)
+        step = self._judge(models)
         for turn in filter(None, (order[:FIRST_TURN_FORMS], order[FIRST_TURN_FORMS:most])):
-            models |= self._fitted({each.name: each.points for each in turn})
-            step = self._judged(models)
+            models |= self._fit_forms({each.name: each.points for each in turn})
+            step = self._judge(models)
             if curve := self._curve(step):
                 models |= curve
-                step = self._judged(models)
+                step = self._judge(models)
             if _leaves_nothing(step):
                 break
         untried = tuple(self.forms[each.name].name for each in order if each.name not in models)
         named = tuple(replace(each, name=self.forms[each.name].name) for each in step.candidates)
         return SearchedForms(named, self._found(step), untried)
 
-    def _fitted(self, points: Mapping[str, Sequence[Point]]) -> dict[str, EvaluatedModel | str]:
+    def _fit_forms(self, points: Mapping[str, Sequence[Point]]) -> dict[str, EvaluatedModel | str]:
         """Fit the valve with each form, from these points."""
         found: dict[str, EvaluatedModel | str] = {}
         names, base = tuple(points), self.base.fit
@@ -147,7 +147,7 @@ class FormSearch:
         bare = ValveFile(valve=fit.valve.valve, effect=self.base.fit.valve.effect)
         return {path: self._model(path, [heights], replace(self.base.fit, valve=bare, onsets_s=fit.onsets_s))}
 
-    def _judged(self, models: Mapping[str, EvaluatedModel | str]) -> EffectStep:
+    def _judge(self, models: Mapping[str, EvaluatedModel | str]) -> EffectStep:
         return judged_step(self.base, models, 1, self.effects)
 
     def _found(self, step: EffectStep) -> tuple[FoundForm, ...]:

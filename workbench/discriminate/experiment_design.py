@@ -122,7 +122,7 @@ class Course(Brief):
                     points.append((time_s, leg.level_pa))
         return tuple(points)
 
-    def sampled(self, period_s: float) -> tuple[Command, Command]:
+    def sample_every(self, period_s: float) -> tuple[Command, Command]:
         """Return times, s, and commands, Pa, each held for a period."""
         at_s, levels_pa = np.array(self.points()).T
         time_s = np.asarray(period_s * np.arange(max(2, round(self.duration_s / period_s))), dtype=np.float64)
@@ -162,7 +162,7 @@ class DesignedExperiment(Brief):
 
     def experiment(self, period_s: float) -> Experiment:
         """Return it as an input sampled at a period, s."""
-        return Experiment(self.course.name, self.separation, *self.course.sampled(period_s))
+        return Experiment(self.course.name, self.separation, *self.course.sample_every(period_s))
 
 
 def design_experiment(
@@ -182,33 +182,33 @@ def design_experiment(
     """
     rivalry = Rivalry(fits, record, terms)
     starts = list(courses(record, terms))
-    rated = list(on_threads(rivalry.stepped, starts, workers))
+    rated = list(on_threads(rivalry.rate_step, starts, workers))
     inside = [i for i, logs in enumerate(rated) if logs is not None]
     if not inside:
         return None
-    kept_pairs = told_apart(np.array([rated[i] for i in inside]), log(IMITATED))
+    kept_pairs = tells_apart(np.array([rated[i] for i in inside]), log(IMITATED))
 
     def least(logs: Vector | None) -> float:
         return -inf if logs is None else float(logs[kept_pairs].min())
 
     def score(course: Course) -> float:
-        return least(rivalry.stepped(course))
+        return least(rivalry.rate_step(course))
 
-    def changed(i: int) -> Course:
+    def change_one(i: int) -> Course:
         return improve_course(score, starts[i], least(rated[i]), terms.bounds, np.random.default_rng([terms.seed, i]))
 
     def rank_courses(found: Sequence[Course], draws: Sequence[int]) -> list[tuple[float, Course]]:
-        refitted = on_threads(lambda course: least(rivalry.refitted(course, draws)), found, workers)
+        refitted = on_threads(lambda course: least(rivalry.rate_refit(course, draws)), found, workers)
         return sorted(zip(refitted, found, strict=True), key=lambda each: -each[0])
 
     kept = sorted(inside, key=lambda i: -least(rated[i]))[:KEPT]
-    found = [*on_threads(changed, kept, workers), *(starts[i] for i in kept)]
+    found = [*on_threads(change_one, kept, workers), *(starts[i] for i in kept)]
     better = [course for _, course in rank_courses(found, CHECKED[:1])][:KEPT]
     separation, best = rank_courses(better, CHECKED)[0]
     return DesignedExperiment(best, exp(separation))
 
 
-def told_apart(rated: NDArray[np.float64], least: float) -> NDArray[np.bool_]:
+def tells_apart(rated: NDArray[np.float64], least: float) -> NDArray[np.bool_]:
     """Return the pairs that are told apart by some course; all where none is.
 
     Args:
@@ -322,11 +322,11 @@ class Rivalry:
         roots = [each.known.root for each in self._fits]
         return [root.T @ root + np.eye(len(root)) for root in roots]
 
-    def stepped(self, course: Course) -> Vector | None:
+    def rate_step(self, course: Course) -> Vector | None:
         """Return the log separation of each pair after one step, (pairs,); None where the stem leaves its window."""
         return self._pairs(course, SEARCHED, self._after_step)
 
-    def refitted(self, course: Course, draws: Sequence[int]) -> Vector | None:
+    def rate_refit(self, course: Course, draws: Sequence[int]) -> Vector | None:
         """Return the log separation of each pair after refits in full, (pairs,); None where the stem leaves its window.
 
         Args:
@@ -359,7 +359,7 @@ class Rivalry:
         """
         composition, period_s = self._compositions[i], self._record.period_s
         generator = np.random.default_rng([self._seed, draw])
-        time_s, command_pa = course.sampled(period_s)
+        time_s, command_pa = course.sample_every(period_s)
         noise_pa = self._noise_pa(i) * _autoregression(generator, command_pa.size - 1, period_s)
         step_s = min(period_s, composition.step_s)
         response = respond(composition, composition.theta, command_pa[:-1] + noise_pa, period_s, step_s=step_s)

@@ -12,7 +12,7 @@ import numpy as np
 
 from config.recording import Recording
 from sim.effect import Effect
-from workbench.data.held_out import joined
+from workbench.data.held_out import join_recordings
 from workbench.data.record import ready
 from workbench.fit.fit_result import Fit
 from workbench.fit.fitting import base_fit
@@ -38,7 +38,7 @@ def race_by_pressure(
     on_path = {name for name, each in library.items() if "pressure" in each.functions}
     if on_path & fits.keys() or any(each.by.slow for each in fits.values()) or not all(map(_is_measured, recordings)):
         return fits
-    record = ready(joined(recordings))
+    record = ready(join_recordings(recordings))
 
     def refit_rival(found: Fit) -> Fit:
         free = [name for name in found.parameters if name.partition(".")[0] not in on_path]

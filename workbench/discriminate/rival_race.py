@@ -23,7 +23,7 @@ from scipy.special import log_ndtr
 
 from config.recording import Recording
 from sim.karnopp import Vector
-from workbench.data.held_out import Part, joined
+from workbench.data.held_out import Part, join_recordings
 from workbench.data.record import ready, require_few_samples, require_fittable
 from workbench.discriminate.experiment_design import DesignedExperiment, Terms, design_experiment
 from workbench.fit.fit_result import Fit
@@ -79,7 +79,7 @@ class RivalRace:
         self._recordings = recordings
         self._begun = begun or self
         """As it stood before the experiments."""
-        whole = joined(recordings)
+        whole = join_recordings(recordings)
         require_few_samples(whole)
         self.record = ready(whole)
         require_fittable(self.record)

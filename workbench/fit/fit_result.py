@@ -18,7 +18,7 @@ from sim.composition import STATIC, Composition
 from sim.karnopp import Vector
 from workbench.compare.comparison_sentences import shorten_notes
 from workbench.compare.measures import fit_percent
-from workbench.data.noise_floor import told
+from workbench.data.noise_floor import say_m
 from workbench.data.record import Record, ready
 from workbench.fit.fitted_parameter import Fitted, draw_parameters, parameter_columns, parameter_table
 from workbench.fit.likelihood import Groups, Likelihood, Rows, soft, soft_weight
@@ -166,7 +166,7 @@ class Fit(Result):
         """Say the error, whether the searches agree, and each parameter with its interval."""
         agreement = "searches agree" if self.trusted else "search came to this alone, or to nothing better: not trusted"
         return [
-            f"error {self.kind.length.said(self.rms_m, '.4g')} rms, floor {told(self.floor_m, self.kind.length)}; "
+            f"error {self.kind.length.said(self.rms_m, '.4g')} rms, floor {say_m(self.floor_m, self.kind.length)}; "
             f"{self.agreement} {agreement}",
             parameter_table(self.parameters, self.kind),
             *([self.by.sentence] if self.by.sentence else []),

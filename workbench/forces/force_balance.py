@@ -254,7 +254,7 @@ class Balance:
             base.append(_Column("diaphragm_area_m2", 0.0, -rows.pressure_pa))
         return [*base, *(_Column(each.name, each.least, self._column(each, z), True) for each in model.terms)]
 
-    def fitted(self, model: ForceModel, *, bounded: bool = True) -> ForceFit:
+    def fit_model(self, model: ForceModel, *, bounded: bool = True) -> ForceFit:
         """Fit a model to all that is fitted, and predict each part from the others."""
         columns, y = self.columns(model), balanced_n(self.rows, self.valve)
         X = np.column_stack([each.values for each in columns])

@@ -111,14 +111,14 @@ def diagnose_forces(
     given = [recordings] if isinstance(recordings, Recording) else list(recordings)
     rows = rows_of([*given, *([test] if test else [])], valve.valve)
     balance = Balance(rows, valve.valve, tested=test is not None)
-    if balance.fitted(ForceModel(), bounded=False).parameters["coulomb_n"] < 0.0 and rows.load_n is not None:
+    if balance.fit_model(ForceModel(), bounded=False).parameters["coulomb_n"] < 0.0 and rows.load_n is not None:
         balance = Balance(rows.turned(), valve.valve, tested=test is not None)
     return _search(balance)
 
 
 def _search(balance: Balance) -> ForceDiagnosis:
     here = ForceModel()
-    base = fit = balance.fitted(here)
+    base = fit = balance.fit_model(here)
     library = balance.library
     steps: list[ForceStep] = []
     while True:
@@ -145,7 +145,7 @@ def _is_new(name: str, there: Sequence[str], library: Mapping[str, Effect]) -> b
 
 def _best(balance: Balance, before: ForceModel, name: str) -> tuple[ForceModel, ForceFit]:
     """Return the shape of an effect that fits best, on what is fitted."""
-    fits = [(model, balance.fitted(model)) for model in balance.candidates(before, name)]
+    fits = [(model, balance.fit_model(model)) for model in balance.candidates(before, name)]
     return min(fits, key=lambda each: each[1].train_rms_n)
 
 

@@ -69,13 +69,13 @@ class ColumnPreview:
     @property
     def opc_qualities(self) -> str:
         """The numbers by which it says, as OPC does, which rows are good; empty of a column that does not."""
-        held = Counter(shown(cell) for cell in self.cells if cell != "")
+        held = Counter(show_cell(cell) for cell in self.cells if cell != "")
         if not self.numbers or not STATUS.search(self.name) or 2 * held[GOOD] <= held.total():
             return ""
         return ", ".join(number for number, _ in held.most_common(MOST_SHOWN))
 
 
-def shown(cell: Cell) -> str:
+def show_cell(cell: Cell) -> str:
     """Return a cell as it is shown, in one short line."""
     text = f"{cell:.10g}" if isinstance(cell, float) else cell.replace("\n", " ")
     return text if len(text) <= WIDEST else text[: WIDEST - 2] + ".."

@@ -12,7 +12,7 @@ from workbench.imports.column_preview import (
     columns_of_all,
     find_decimal,
     likely_header,
-    shown,
+    show_cell,
 )
 from workbench.imports.control_loop import LoopColumn, LoopColumns, loops_of
 from workbench.imports.file_kind import raw_tables
@@ -51,7 +51,7 @@ class ExportPreview:
 
     def _blocks(self) -> list[Block]:
         rows = [
-            (each.name, each.unit or "", *(shown(cell) for cell in (*each.cells, "", "", "")[:FIRST_CELLS]))
+            (each.name, each.unit or "", *(show_cell(cell) for cell in (*each.cells, "", "", "")[:FIRST_CELLS]))
             for each in self.columns
         ]
         proposed = " ".join(map(quote_word, self.words))

@@ -29,7 +29,7 @@ class Samples:
     lines: "array[int]"
     notes: dict[str, str]
 
-    def kept(self, rows: Sequence[int]) -> "Samples":
+    def keep_rows(self, rows: Sequence[int]) -> "Samples":
         """Return some of the rows."""
         cells = {name: [column[row] for row in rows] for name, column in self.cells.items()}
         return Samples(self.header, cells, array("q", (self.lines[row] for row in rows)), self.notes)
@@ -126,7 +126,7 @@ def _of_its_rows(samples: Samples) -> Samples:
     if not empty:
         return samples
     left_out = set(empty)
-    return samples.kept([row for row in range(len(samples.lines)) if row not in left_out])
+    return samples.keep_rows([row for row in range(len(samples.lines)) if row not in left_out])
 
 
 def _without_footer(samples: Samples, clock: str) -> Samples:
@@ -140,4 +140,4 @@ def _without_footer(samples: Samples, clock: str) -> Samples:
     if kept == len(cells):
         return samples
     samples.notes["rows without a time at the end, left out"] = str(len(cells) - kept)
-    return samples.kept(range(kept))
+    return samples.keep_rows(range(kept))

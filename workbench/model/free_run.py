@@ -37,9 +37,9 @@ from sim.open_loop import (
     PATH_ROWS,
     PRESSURE,
     at_rest,
-    checked_commands,
-    checked_periods,
-    checked_step,
+    check_commands,
+    check_periods,
+    check_step,
     require_numbers,
 )
 from workbench.data.record import Mask, Record
@@ -304,10 +304,10 @@ def _segment(
     """Return a segment; drive_pa, Pa, (n, parts)."""
     first, end = rows
     parts = drive_pa.shape[1]
-    held_pa = checked_commands(drive_pa[first : end - 1].ravel())
-    load_n = None if record.load_n is None else checked_commands(np.repeat(record.load_n[first : end - 1], parts))
-    periods_s = checked_periods(np.repeat(np.diff(record.time_s[first:end]) / parts, parts), held_pa)
-    step_s = checked_step(min(float(periods_s.max()), longest_s))
+    held_pa = check_commands(drive_pa[first : end - 1].ravel())
+    load_n = None if record.load_n is None else check_commands(np.repeat(record.load_n[first : end - 1], parts))
+    periods_s = check_periods(np.repeat(np.diff(record.time_s[first:end]) / parts, parts), held_pa)
+    step_s = check_step(min(float(periods_s.max()), longest_s))
     begin = initial_state(record, first, end, moving=not by_setpoint)
     before = before_start(record, first, end, begin.position_m) if by_setpoint else None
     return Segment(first, end, begin, before, lead, held_pa, load_n, periods_s, parts, step_s)

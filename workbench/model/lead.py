@@ -13,7 +13,7 @@ import numpy as np
 from config.recording import Column
 from sim.composition import Composition
 from sim.karnopp import MEMORY, Vector
-from sim.open_loop import checked_commands, checked_periods
+from sim.open_loop import check_commands, check_periods
 from workbench.data.record import Record
 from workbench.model.initial_state import BeforeStart, InitialState, before_start, initial_state
 
@@ -49,8 +49,8 @@ def lead_of(record: Record, composition: Composition, drive_pa: Column, segment:
     begin = initial_state(record, begun, end)
     before = before_start(record, begun, end, begin.position_m)
     until = max(first, begun + max(before.rests, 1))
-    held_pa = checked_commands(drive_pa[begun:until])
-    periods_s = checked_periods(np.diff(record.time_s[begun : until + 1]), held_pa)
+    held_pa = check_commands(drive_pa[begun:until])
+    periods_s = check_periods(np.diff(record.time_s[begun : until + 1]), held_pa)
     return Lead(begin, float(record.time_s[begun]), before, held_pa, periods_s, first - begun, memories)
 
 

@@ -19,7 +19,7 @@ from config.recording import Column
 from config.valve_file import ValveParameters
 from sim.composition import AREA, SPRING, Composition
 from sim.karnopp import Vector
-from sim.open_loop import checked_commands, checked_periods
+from sim.open_loop import check_commands, check_periods
 from sim.quasi_static import ALONG, FED_BACK, FREE
 from workbench.data.pressure_lag import command_followed_pa, pressure_lag_s
 from workbench.data.record import Mask, Record
@@ -124,9 +124,9 @@ def slow_segments(
         counted = np.flatnonzero(judged[rows])
         following = rows[1:] if at_end else rows[:-1]
         held_pa = _along_pa(record, drive_pa, rows) if along else drive_pa[following]
-        held_pa = checked_commands(held_pa)
-        load_n = None if record.load_n is None else checked_commands(np.repeat(record.load_n[following], parts))
-        periods_s = checked_periods(np.outer(np.diff(record.time_s[rows]), shares).ravel(), held_pa)
+        held_pa = check_commands(held_pa)
+        load_n = None if record.load_n is None else check_commands(np.repeat(record.load_n[following], parts))
+        periods_s = check_periods(np.outer(np.diff(record.time_s[rows]), shares).ravel(), held_pa)
         begin = initial_state(record, first, end, moving=False)
         before = before_start(record, first, end, begin.position_m) if composition.by_setpoint else None
         found.append(

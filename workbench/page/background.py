@@ -17,7 +17,7 @@ from config.errors import CommandFailed, InputError
 from config.recording import Recording
 from config.valve_file import ValveFile
 from sim.effect import written_here
-from sim.own_effect import checked
+from sim.own_effect import check_effect
 from workbench.diagnosis.diagnosis import Diagnosis, diagnose
 from workbench.diagnosis.extension import Extension, extend
 from workbench.discover.discovery import Discovery, discover
@@ -223,4 +223,4 @@ def effect_checked(tell: Tell, valve: ValveFile, path: Path) -> None:
         InputError: as `checked`.
     """
     tell(Progressed("compiling", 0.0))
-    checked(path, valve.valve)
+    check_effect(path, valve.valve)

@@ -63,7 +63,7 @@ class ColumnsPanel:
                     each.props("dense").classes("w-full").on("blur", self._show)
             with ui.column().classes("wide"):
                 self._preview = ui.column().classes("w-full").props('data-testid="preview" aria-live="polite"')
-                self._confirm = ui.button("Read it", on_click=self._taken).props('no-caps data-testid="confirm"')
+                self._confirm = ui.button("Read it", on_click=self._take_columns).props('no-caps data-testid="confirm"')
                 with ui.expansion("first values of every column", icon="table_rows").classes("w-full"):
                     self._table()
         ui.timer(0.0, self._show, once=True)
@@ -161,6 +161,6 @@ class ColumnsPanel:
         columns = [{"name": key, "label": head, "field": key, "align": "left"} for key, head in heads.items()]
         ui.table(rows=rows, columns=columns, row_key="name").props("dense flat bordered").classes("w-full")
 
-    async def _taken(self) -> None:
+    async def _take_columns(self) -> None:
         if self._read is not None:
             await self._take(self._read)

@@ -32,7 +32,7 @@ class EffectPanel:
         self._dress()
         theme.listen(self._dress)
         with ui.row().classes("items-center"):
-            self._save = ui.button("Save and check", icon="save", on_click=self._saved)
+            self._save = ui.button("Save and check", icon="save", on_click=self._save_effect)
             self._save.props('no-caps data-testid="effect-save"')
             ui.button("Save and export", icon="download", on_click=self._download).props("outline no-caps")
         self._said = ui.label().props('aria-live="polite" data-testid="effect-said"').style("white-space: pre-wrap")
@@ -44,7 +44,7 @@ class EffectPanel:
         if not self._editor.is_deleted:
             self._editor.set_theme("vscodeDark" if self._theme.is_dark else "vscodeLight")
 
-    def _saved(self) -> None:
+    def _save_effect(self) -> None:
         with errors_told():
             path = self._desk.write_effect(str(self._name.value or ""), self._editor.value)
             self._desk.check_effect(path)

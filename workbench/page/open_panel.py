@@ -17,7 +17,7 @@ from webpage.telling import aside, errors_told, heading, sentences
 from webpage.theme import Theme
 from workbench.page.columns_panel import ColumnsPanel
 from workbench.page.desk import Desk, name_valve
-from workbench.page.opening import Export, Opened, open_file_like, opened, wrong_with
+from workbench.page.opening import Export, Opened, open_file, open_file_like, wrong_with
 from workbench.page.provenance import DataSheetMade, NamedValve
 
 SUFFIXES = (".csv", ".txt", ".parquet", ".xlsx", ".mat")
@@ -151,12 +151,12 @@ class OpenPanel:
         path = await self._keep_file(event)
         event.sender.run_method("reset")
         with errors_told({str(path): event.file.name, "recording": event.file.name}):
-            await self._found(await aside(opened, path, event.file.name))
+            await self._found(await aside(open_file, path, event.file.name))
 
     async def _handle_choice(self, text: str) -> None:
         path = Path(text)
         with errors_told():
-            await self._found(await aside(opened, path, text))
+            await self._found(await aside(open_file, path, text))
 
     async def _found(self, found: Opened | Export) -> None:
         if isinstance(found, Export):

@@ -125,7 +125,7 @@ class Export:
     proposed: ColumnChoice
 
 
-def opened(path: Path, name: str) -> Opened | Export:
+def open_file(path: Path, name: str) -> Opened | Export:
     """Read a recording; of another program's file return what it holds.
 
     Raises:
@@ -157,7 +157,7 @@ def open_file_like(path: Path, name: str, first: Opened) -> Opened:
     Raises:
         InputError: it is none, or not to be read so.
     """
-    found = opened(path, name)
+    found = open_file(path, name)
     if isinstance(found, Opened):
         return found
     if first.choice is None:

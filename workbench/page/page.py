@@ -13,7 +13,7 @@ from workbench.page.compare_panel import ComparePanel
 from workbench.page.desk import Desk, name_valve
 from workbench.page.journal_panel import JournalPanel
 from workbench.page.open_panel import OpenPanel, files_of
-from workbench.page.opening import Opened, opened
+from workbench.page.opening import Opened, open_file
 from workbench.page.search_panel import SearchPanel
 
 TITLE = "positioner workbench"
@@ -47,7 +47,7 @@ class Workbench:
             if self._valve is not None:
                 desk.take_valve(name_valve(self._valve))
             if len(self._files) == 1:
-                found = opened(self._files[0], str(self._files[0]))
+                found = open_file(self._files[0], str(self._files[0]))
                 if isinstance(found, Opened):
                     desk.take_recording(found)
                 else:

@@ -167,13 +167,13 @@ def last_excited(folder: Path, valve: str) -> Recording | None:
 
     from config.codes import State
     from config.recorder_files import files_of
-    from workbench.data.held_out import joined
+    from workbench.data.held_out import join_recordings
 
     newest = files_of(folder, valve)[-LATEST_FILES:]
     parts = [each for each in map(_read, newest) if each is not None]
     if not parts:
         return None
-    whole = joined(parts)
+    whole = join_recordings(parts)
     excited = whole.columns["state"] == State.S3_IDENTIFY
     rows = np.flatnonzero(excited)
     if not rows.size or excited[-1]:
