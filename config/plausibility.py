@@ -15,7 +15,7 @@ from config.recording import Column, Recording
 
 LONGEST_STROKE_M = 1.5
 LARGEST_PA, LEAST_SPAN_PA = 2e6, 200.0
-FEWEST_JUDGED_ROWS = 50
+FEWEST_JUDGED_ROWS = 50  # below these a share of rows says nothing
 REVERSE = -0.5
 """Correlation of command and position below which the valve closes with pressure."""
 MISSING = 0.05
@@ -24,14 +24,14 @@ RESPONDS_TOO_EARLY = 0.2
 """Share of the command's changes that the stem may have followed by the same row."""
 FAR = 5.0
 """Spans of all other positions between them and one that is no position."""
-HISTORIAN_GAP_PERIODS = 20.0
+HISTORIAN_GAP_PERIODS = 20.0  # a longer gap: the historian stored nothing
 MOVED = 0.02
 """Of the span of the positions: what counts as a move, and of the commands: as a change."""
 LONG_ROWS = 10
 """Rows for which a command is held, so that what the stem did before and after its change can be told apart."""
 ANSWER_SHARE = 0.1
 """Of the span of the positions: what counts as an answer to a change."""
-FEW_JUMPS = 3
+FEW_JUMPS = 3  # fewer may be moves of the valve
 JUMP_SHARE = 0.9
 """Of the span of the positions: a jump over nearly all of it."""
 WRAPS = 0.9

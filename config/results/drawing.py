@@ -19,7 +19,7 @@ if TYPE_CHECKING:
 
 MEASURED, MODEL, BETTER, QUIET, FAINT = "#1f2a37", "#d9622b", "#1b7f79", "#5b6675", "#9aa4b1"
 """Colours: what was measured, a model, what is valid or chosen, what stands beside it, what was refused."""
-WIDTH_INCHES, ROW_INCHES = 10.0, 0.26
+WIDTH_INCHES, ROW_INCHES = 10.0, 0.26  # of a picture, and of a bar in it with its words
 TICKS = (1.0, 2.0, 5.0)
 """Of a decade."""
 

@@ -17,7 +17,7 @@ if TYPE_CHECKING:
 
 REQUEST_EVERY_S = 1
 ANSWER_WITHIN_MS = 200
-ROW_PIXELS = 60
+ROW_PIXELS = 60  # between nodes in the editor
 TAB = "positioner"
 
 ASK = """const unit = {unit};

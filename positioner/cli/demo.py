@@ -52,14 +52,14 @@ if TYPE_CHECKING:
 HELP = "show both laws on a simulated sticking valve, over a real bus, in about a minute"
 EXAMPLE = "positioner demo --out demo-out"
 
-PSI = 6894.757
+PSI = 6894.757  # Pa
 ALPHA_PA, BETA_PA = 6.4 * PSI, 1.92 * PSI
 """The seed's excitation."""
 AGED_ALPHA_PA = 11.5 * PSI
 """Enough for the aged packing to break away from where the stem is then."""
 STEPS = (0.65, 0.40, 0.80, 0.50, 0.40)
 """This valve's spring has no preload: without pressure it pulls the stem down only to F_c / k_s, 0.27 to 0.35 p.u."""
-SLIDES_STEPS = (0.65, 0.40)
+SLIDES_STEPS = (0.65, 0.40)  # p.u.; both ways by the law of slides
 SMALL_STEPS = (0.41, 0.405, 0.43)
 """All below the 5.3 % of stroke from which on the paper's law moves this stem; after the last of `STEPS`."""
 STEP_S = 0.5
@@ -94,9 +94,9 @@ SLIDES = "slides"
 """The phase under the law of slides."""
 LARGEST_ERROR_PU = 0.01
 """By the paper."""
-LARGEST_SLIDES_ERROR_PU = 0.001
+LARGEST_SLIDES_ERROR_PU = 0.001  # of a step by slides
 BY_STEPS = ", the first move down: by steps, and left where it lands nearer than this law can move"
-LARGEST_RATIO_ERROR = 0.01
+LARGEST_RATIO_ERROR = 0.01  # of b/c and k/c
 PAPER = "paper"
 """Beside `SLIDES`, the law of a daemon."""
 SAMPLES_LOST = "lost_samples"

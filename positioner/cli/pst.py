@@ -20,7 +20,7 @@ if TYPE_CHECKING:
 HELP = "test: a partial stroke, with break-out, friction and times against a reference (moves the valve)"
 EXAMPLE = "positioner pst site.toml --travel 0.1 --against as_left"
 
-DAYS_A_YEAR = 365.25
+DAYS_A_YEAR = 365.25  # Julian
 
 
 def add_arguments(parser: argparse.ArgumentParser) -> None:

@@ -33,7 +33,7 @@ WAL_PAGES = 128
 """After so many the write-ahead log goes into the file."""
 WAL_BYTES = 1 << 20
 """What it may come to with the largest change."""
-SECONDS_A_DAY = 86_400.0
+SECONDS_A_DAY = 86_400.0  # of UTC
 NO_TEXT = "what it calls its tables is no text"
 
 

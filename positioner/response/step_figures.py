@@ -28,9 +28,9 @@ from positioner.response.rest_level import RestLevel, rest_at_the_end
 from positioner.response.step_detection import StepChange
 
 T63, T86 = 0.632, 0.865  # shares of the travel, ISA-75.25.01
-OBSERVABLE_SIGMA = 5.0
+OBSERVABLE_SIGMA = 5.0  # of the noise: less is no response
 OBSERVABLE_PERCENT = 0.5
-SMALLEST_SIGMA = 25.0
+SMALLEST_SIGMA = 25.0  # of the noise: a smaller move has no times
 DRIFT = 0.01
 """A stem that still moves by this part of the move has not settled."""
 FEWEST_WITHIN = 5

@@ -13,7 +13,7 @@ from dataclasses import dataclass
 
 from positioner.tests_on_the_valve.program import require_within
 
-HOURS_A_YEAR = 8766.0
+HOURS_A_YEAR = 8766.0  # Julian
 SMALL = 0.1
 """lambda T up to which the formula's linear form holds within 5 %."""
 ASSUMPTIONS = (

@@ -23,7 +23,7 @@ Array = npt.NDArray[np.float64]
 Flags = npt.NDArray[np.bool_]
 WITHIN = 0.2
 """Relative error of S that counts as right."""
-DRAWN_ANEW = 2000
+DRAWN_ANEW = 2000  # draws of the loops: a 95 % end is good to 0.005
 
 
 @dataclass(frozen=True, slots=True)

@@ -29,7 +29,7 @@ from sim.effect import Effect, find_effects, first_effects, shipped_effect
 from workbench.blind.input_signal import excitation
 from workbench.blind.trial import LEVELS, NOISE_M, Answer, Trial, refitted_rmse_m
 
-VISIBLE_FLOORS = 0.5
+VISIBLE_FLOORS = 0.5  # a valve without the effect misses as much as half the floor
 LEAST_TRAVEL = 0.1
 """Of the stroke, in either record."""
 

@@ -28,7 +28,7 @@ from workbench.blind.input_signal import lead_in
 NOISE_M = 5e-5
 LEAD_IN_S = 5.0
 PRESSURE_NOISE_PA, CORRELATION_S = 300.0, 0.2
-BREAK_AWAY_JITTER = 0.04
+BREAK_AWAY_JITTER = 0.04  # of static friction, standard deviation from slip to slip
 LEVELS = 2**12
 DISTURBED_EVERY_S = 2e-3
 PRESSURE_STEP_PA = 100.0

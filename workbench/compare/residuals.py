@@ -19,11 +19,11 @@ from config.results.result import Brief
 RESIDUAL_LAGS = 25
 NEXT = 5
 """Samples over which what is no noise goes on."""
-BAND_99 = 2.576
+BAND_99 = 2.576  # deviations of a normal that 99 % lie within
 MEMORY = 0.2
 """Part of the record over which correlations are summed for the input's band."""
-BINS = 20
-FEWEST_BIN_ROWS = 5
+BINS = 20  # of a profile over position, velocity or pressure
+FEWEST_BIN_ROWS = 5  # a bin of fewer has no mean
 LONGEST_WINDOW = 1024
 """Samples of a piece of which a spectrum is made."""
 

@@ -37,7 +37,7 @@ TURNED = 6.0
 """Standard deviations of what is smoothed by which a stroke turns back;"""
 SMOOTHED = (59.0 / 231.0) ** 0.5
 """of noise of 1, after smoothing by parabolas over nine samples."""
-NEAR_ENDS = 0.05
+NEAR_ENDS = 0.05  # of the travel
 BALANCE_ROWS = 12
 """Rows that a balance needs."""
 

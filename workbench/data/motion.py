@@ -7,7 +7,7 @@ import numpy as np
 
 from config.recording import Column
 
-REACH = 2
+REACH = 2  # samples to either side of which a velocity is made
 PARABOLA = 9
 """Samples of a local parabola, from which accelerations come."""
 

@@ -21,7 +21,7 @@ from workbench.data.stillness import eventful
 
 FITTED_WORK = 40_000
 """Of what is fitted and held out together."""
-PARTS = 24
+PARTS = 24  # stretches, evenly over the record
 NAMED = 3
 """Stretches that are told with their times; of more, the first."""
 

@@ -19,7 +19,7 @@ from workbench.fit.fit_result import Fit
 from workbench.fit.fitting import problem_of
 from workbench.model.free_run import FreeRun
 
-POINTS = 201
+POINTS = 201  # at which it is drawn
 P_1_PA = 1e5
 
 

@@ -28,7 +28,7 @@ LOCAL = frozenset({"bump", "step"})
 """Shapes that change at one place only."""
 KNOT_WIDTHS = (-2.5, -1.9, -1.55, -1.3, -1.05, -0.8, -0.45, 0.0, 0.45, 0.8, 1.05, 1.3, 1.55, 1.9, 2.5)
 """Knots about such a place, in widths."""
-EVENLY = 9
+EVENLY = 9  # knots over the span
 NEARER = 0.02
 """Of the span: knots nearer to each other are one."""
 HEIGHT = "height_"

@@ -11,7 +11,7 @@ from textwrap import fill, indent
 from workbench.discover.curve import FLAT, HEIGHT
 from workbench.discover.grammar import Form, Quantity
 
-LINE_CHARACTERS = 116
+LINE_CHARACTERS = 116  # of a line in the file
 
 
 def write_forms(forms: Sequence[Form], folder: Path) -> dict[str, Form]:

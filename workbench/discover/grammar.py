@@ -296,7 +296,7 @@ def _strength(
     return Quantity(key, symbol, text, least, most, tuple(starts), scale, off=0.0)
 
 
-FORCES = (-0.1, 0.1, -0.5, 0.5)
+FORCES = (-0.1, 0.1, -0.5, 0.5)  # starts, of the scale
 FORCE = Place(
     "force", "a force", "force", (), "float", "F = -F_1 g", "-{c} * ({g})",
     _strength("force_n", "F_1", "force, against opening", -1e6, 1e6, FORCES, "coulomb_n"), inverse=True,
@@ -308,7 +308,7 @@ DRAG = Place(
     _strength("force_n", "F_1", "drag at 1 m/s", 0.0, 1e8, (0.05, 0.3, 1.0, 3.0), "viscous_ns_per_m"),
     inverse=True, imports=("copysign",),
 )  # fmt: skip
-BOTH_WAYS = (-0.1, 0.1, -0.4, 0.4, -1.5, 1.5)
+BOTH_WAYS = (-0.1, 0.1, -0.4, 0.4, -1.5, 1.5)  # starts, of the scale
 ONE_WAY = Place(
     "one_way_drag", "a drag one way", "force", ("v",), "float", "F = -|F_1| g sign v where F_1 v > 0",
     "-abs({c}) * copysign({g}, v) if {c} * v > 0.0 else 0.0",

@@ -52,7 +52,7 @@ STRUCTURED = 0.3
 RISEN = 1.25
 """Times the floor of the recording behind the model: a floor that lies higher is itself something new. Laps that differ
 by a friction that drifts raise it, and the drift would lie below it."""
-MOST_CANDIDATES = 5
+MOST_CANDIDATES = 5  # kept of a diagnosis, for the table
 
 
 @dataclass(frozen=True, slots=True)

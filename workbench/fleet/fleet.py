@@ -21,7 +21,7 @@ from workbench.fleet.valve_course import ValveCourse, valve_in
 if TYPE_CHECKING:
     from matplotlib.figure import Figure
 
-MOST_LINES = 30
+MOST_LINES = 30  # of a summary: a screen
 Told = Callable[[str, Entry, Examination], None]
 
 

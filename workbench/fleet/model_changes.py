@@ -20,7 +20,7 @@ if TYPE_CHECKING:
 
 LEAST_TOLD_SHARE = 0.01
 """Of a parameter: less is not told."""
-MOST_DRAWN = 40
+MOST_DRAWN = 40  # valves in one picture: more cannot be read
 LONGEST_PERCENT = 150.0
 """What changed by more is drawn as this, with its number beside it; so is an effect that was not there."""
 

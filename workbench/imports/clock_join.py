@@ -25,7 +25,7 @@ from workbench.imports.export_units import UNITS
 
 MEASURED = ("position", "velocity", "pressure", "load", "current", "force", "torque")
 """How the names of columns begin that are measured."""
-FEWEST_CLOCK_ROWS = 3
+FEWEST_CLOCK_ROWS = 3  # two rows make no step to compare
 ALIKE_STEP = 1e-2
 """Of a step: how alike those of two clocks of the same rows are, each rounded by its program."""
 RATIOS = tuple(each for unit in UNITS["_s"].values() if unit != 1.0 for each in (unit, 1.0 / unit))

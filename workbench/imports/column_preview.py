@@ -19,7 +19,7 @@ from workbench.imports.number_notation import decimal_sign, is_numeral
 from workbench.imports.raw_table import Cell, RawTable
 from workbench.imports.turned_tables import signals_in, table_of_signal, turn_table
 
-LOOKED_AT = 200
+LOOKED_AT = 200  # rows that are read to say what a column holds
 MOST_SHOWN = 5
 """Words of a status that are shown."""
 WIDEST = 24

@@ -27,7 +27,7 @@ from workbench.imports.typed_tables import Columns
 
 Groups = list[tuple[str, Columns]]
 """Columns of float64 by their names, of each group, by its name."""
-REFUSED = 2
+REFUSED = 2  # exit status of a file that is refused, as of every command
 LONGEST_S, BYTES_A_S = 20.0, 1e6
 """Of the processor, for which it may read; more of a large file. The slowest library takes a tenth of a second for a
 megabyte."""

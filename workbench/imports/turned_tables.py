@@ -25,7 +25,7 @@ LOOKED_AT = 200
 """Rows by which a table is told to have a row a value."""
 ROW_A_SIGNAL = 10
 """Cells of a row, from which on one that begins with a name is taken for a signal."""
-MOST_ROWS_OF_SIGNALS = 60
+MOST_ROWS_OF_SIGNALS = 60  # more rows are samples
 MOST_SIGNALS = 20
 """Words of a column that says whose a value is, which a preview lists."""
 UNIT = r"^(unit|einheit|unit[ée]s?|unidad|unit[àa]|uom|eu|engineering units?|jednostka)s?$"

@@ -24,7 +24,7 @@ SUFFIXES = (".csv", ".txt", ".parquet", ".xlsx", ".mat")
 """Of files that a folder offers."""
 MOST_BUTTONS = 48
 """Files that are offered by a button each."""
-MOST_BLIND = 10_000
+MOST_BLIND = 10_000  # seeds that are drawn from
 
 
 class OpenPanel:

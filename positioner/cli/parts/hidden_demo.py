@@ -26,7 +26,7 @@ if TYPE_CHECKING:
 
 HIDDEN = {"name": "position_friction", "growth": 0.6, "travel_m": STROKE_M}
 CANDIDATES = ("position_friction", "spring_hardening", "asymmetric_friction", "preload")
-STEPS = (0.65, 0.50, 0.72, 0.45, 0.60, 0.35, 0.55, 0.40, 0.68, 0.52)
+STEPS = (0.65, 0.50, 0.72, 0.45, 0.60, 0.35, 0.55, 0.40, 0.68, 0.52)  # p.u.; the whole travel, both ways
 HIDDEN_PERIOD_S = 5e-3
 STEP_S, HIDDEN_SETTLED_S = 0.8, 0.1
 """Time for each; its error is the mean over the last part of it."""
