@@ -57,11 +57,6 @@ class ValveParameters(Schema):
             raise ValueError(f"static_n must be at least coulomb_n ({coulomb}), it is {static}")
         return self
 
-    @property
-    def deadzone_m_per_s(self) -> float:
-        """Karnopp's band on velocity, in m/s."""
-        return self.deadzone_ratio * self.stribeck_velocity_m_per_s
-
 
 class EffectTable(BaseModel):
     """One `[[effect]]` table: its name and that effect's own parameters, which the model side checks.

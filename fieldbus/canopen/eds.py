@@ -34,7 +34,7 @@ DATA_TYPE: dict[WireType, int] = {
 INTEGER8, UNSIGNED8, UNSIGNED16, UNSIGNED32, VISIBLE_STRING = 0x02, 0x05, 0x06, 0x07, 0x09  # data types of CiA 301
 BYTES = {INTEGER8: 1, UNSIGNED8: 1, UNSIGNED16: 2, UNSIGNED32: 4}
 BYTES |= {code: 2 * Format(wire).words for wire, code in DATA_TYPE.items()}
-VAR, ARRAY, RECORD = 7, 8, 9  # object types of CiA 301
+VAR, RECORD = 7, 9  # object types of CiA 301
 
 VENDOR_NUMBER, PRODUCT_NUMBER, REVISION = 0, 0x49505054, 0x00010000
 """CiA has given the project no vendor number; the product is "IPPT", an I/P with position transmitter."""

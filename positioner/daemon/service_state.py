@@ -52,11 +52,6 @@ TRANSITIONS: dict[ServiceState, dict[ServiceEvent, ServiceState]] = {
 """Where an event leads; what is not named leaves the state as it is."""
 
 
-def after_event(state: ServiceState, event: ServiceEvent) -> ServiceState:
-    """Return the state after an event, by the table."""
-    return TRANSITIONS[state].get(event, state)
-
-
 def service_state(decision: Decision, limits: Limits, *, shadow: bool) -> ServiceState:
     """Return the state that a cycle's decision stands for."""
     if shadow:

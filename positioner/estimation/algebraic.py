@@ -152,11 +152,6 @@ class Identifier:
             self._bends += left_out * left_out * (2 if self._count == 1 else 1)
         self._slope, self._h_before = slope, h
 
-    def integrals(self) -> tuple[Array, Array]:
-        """Return q (3) and P (3 x 3) of (13), in windows, strokes and units of pressure."""
-        columns = self._window().columns
-        return columns[0], columns[1:].T
-
     def windows(self) -> list[Window]:
         """Return the windows that are solved together, the longest last; in windows, strokes and units of pressure."""
         return [each for each in self._kept if AGAIN**0.5 * each.end <= self._t] + [self._window()]

@@ -37,7 +37,7 @@ def problem(path: Path, text: str) -> str:
 def test_the_seed_valve_has_the_corrected_static_friction() -> None:
     valve = load_valve(shipped_valve("seed")).valve
     assert valve.static_n == pytest.approx(384 * 4.448222, rel=1e-4)
-    assert valve.deadzone_m_per_s == pytest.approx(0.6 * 2.54e-4)
+    assert valve.deadzone_ratio * valve.stribeck_velocity_m_per_s == pytest.approx(0.6 * 2.54e-4)
 
 
 @pytest.mark.parametrize(

@@ -11,7 +11,7 @@ from docs.code_tables import STATES_BEGIN, STATES_END
 from positioner.control.controller_memory import Decision
 from positioner.control.settings import Settings
 from positioner.daemon.ending import Endings
-from positioner.daemon.service_state import ServiceEvent, after_event, service_state, table
+from positioner.daemon.service_state import TRANSITIONS, ServiceEvent, service_state, table
 from tests.control.test_controller import LAW, STROKE_M, Bench
 
 SAFETY = {"action": "vent", "lost_after_cycles": 5}
@@ -85,12 +85,12 @@ def test_every_event_in_every_state_leads_where_the_table_says(state: ServiceSta
     service = Service(state)
     assert service.state is state
     getattr(service, event.name.lower())()
-    assert service.state is after_event(state, event)
+    assert service.state is TRANSITIONS[state].get(event, state)
 
 
 def test_the_end_is_the_end() -> None:
-    assert {after_event(each, ServiceEvent.ENDED) for each in ServiceState} == {ServiceState.STOPPED}
-    assert {after_event(ServiceState.STOPPED, each) for each in ServiceEvent} == {ServiceState.STOPPED}
+    assert {TRANSITIONS[each].get(ServiceEvent.ENDED, each) for each in ServiceState} == {ServiceState.STOPPED}
+    assert TRANSITIONS[ServiceState.STOPPED] == {}
     assert Endings.__doc__, "tests/cli/test_daemon_process.py ends it, tests/daemon/test_ending.py by every signal"
 
 

@@ -67,7 +67,8 @@ def test_running_realisation_is_the_direct_multiple_integral_on_an_uneven_grid(h
     identifier = Identifier(1.0, 1.0, 1.0, pressure_held=held)
     for sample in zip((t + 12.5).tolist(), xs.tolist(), us.tolist(), strict=True):
         identifier.update(*sample)
-    q, P = identifier.integrals()
+    columns = identifier.windows()[-1].columns
+    q, P = columns[0], columns[1:].T
 
     def x(tau: Array) -> Array:
         return np.interp(tau, t, xs)
@@ -228,7 +229,10 @@ def test_constant_pressure_is_singular_with_and_without_noise() -> None:
 
 def test_in_its_own_units_the_system_is_well_conditioned() -> None:
     """Condition 2e4, of nearly parallel b and c columns, where SI units make it a million million."""
-    _, P = identifier_of(seed_run()).integrals()
-    si = P * np.array([WINDOW**5, WINDOW**6, WINDOW**6 * 1e5 / STROKE]) * WINDOW ** np.arange(3)[:, None]
+    si = (
+        identifier_of(seed_run()).windows()[-1].columns[1:].T
+        * np.array([WINDOW**5, WINDOW**6, WINDOW**6 * 1e5 / STROKE])
+        * WINDOW ** np.arange(3)[:, None]
+    )
     assert solution_of(seed_run()).condition < 1e5
     assert np.linalg.cond(si) > 1e3 * solution_of(seed_run()).condition

@@ -216,5 +216,6 @@ def test_without_stribeck_drop_it_creeps_along_the_band_and_goes_on() -> None:
     valve = Valve.from_file(file)
     valve.advance((SEED.valve.coulomb_n + 0.05) / SEED.valve.diaphragm_area_m2, 0.1)
     travel_m = 0.05 / SEED.valve.spring_n_per_m
-    assert travel_m <= valve.position_m < travel_m + file.valve.deadzone_m_per_s * 1e-5
+    band_m_per_s = file.valve.deadzone_ratio * file.valve.stribeck_velocity_m_per_s
+    assert travel_m <= valve.position_m < travel_m + band_m_per_s * 1e-5
     assert valve.velocity_m_per_s == 0.0

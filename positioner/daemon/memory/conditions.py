@@ -15,7 +15,6 @@ from config.daemon_file import DaemonFile
 from config.extended_valve import ExtendedValve
 
 TABLES = ("device", "valve", "pressure", "law")
-KEYS = ("cycle.period_s",)
 OF_THE_LINK = frozenset(
     {"device.reply_timeout_s", "device.communication_timeout_s", "device.communication_action", "device.tls"}
 )
