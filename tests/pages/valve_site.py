@@ -16,7 +16,7 @@ stroke_m = 0.1016
 port = {device_port}
 reply_timeout_s = 2.0
 [cycle]
-period_s = 2e-3
+period_s = 5e-3
 [supervisory]
 port = {port}
 [recorder]
