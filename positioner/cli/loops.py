@@ -22,7 +22,7 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
 def run(arguments: argparse.Namespace) -> int:
     """Print the ranking; 1 if any valve sticks, else 0."""
     from config.errors import InputError
-    from config.results.block import Table, as_text
+    from config.results.block import as_text
     from workbench.loops.loop_report import report_loops
     from workbench.loops.plant import diagnose_plant, read_manifest
     from workbench.report import require_plotly
@@ -41,17 +41,7 @@ def run(arguments: argparse.Namespace) -> int:
         write_json(arguments.json, [each.as_json() for each in plant.ranked])
     if arguments.report is not None:
         report_loops(plant, arguments.report, arguments.manifest.name)
-    rows = [
-        (
-            each.record.name,
-            each.verdict,
-            "–" if each.probability is None else f"{100 * each.probability:.0f} %",
-            f"{100 * each.variance_cost:.2g} %",
-            each.cause or "; ".join(gate.says for gate in each.gates),
-        )
-        for each in plant.ranked
-    ]
-    print(as_text([Table(("loop", "", "sticks", "error's std", ""), rows)]))
+    print(as_text([plant.ranking]))
     for group in plant.groups:
         print(
             f"{', '.join(group.loops)} oscillate together, period {group.period_s:.4g} s; "

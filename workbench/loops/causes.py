@@ -14,8 +14,9 @@ The output is asked the same: the loop is closed, so stem, process and controlle
 later, with the sign of negative feedback. A controller integrates, and so shows a rest of the stem above its noise.
 """
 
-from collections.abc import Sequence
+from collections.abc import Iterator, Sequence
 from dataclasses import dataclass, replace
+from typing import Any
 
 import numpy as np
 import numpy.typing as npt
@@ -26,13 +27,13 @@ from workbench.loops.oscillation import Oscillation
 from workbench.loops.stem_and_process import cost_of, costs_of_stems, respond, rest_positions
 from workbench.loops.thresholds import LIMITS
 
-CAUSES_FORM = 1
+CAUSES_FORM = 2
 """To be raised when causes would come out differently: what was kept is then made anew."""
 SHARES = (0.12, 0.17, 0.24, 0.33, 0.44, 0.55, 0.66, 0.77, 0.87, 0.95)
 """Apparent stiction that is tried, of the output's span: less does not rule a loop, beyond it the stem never moves."""
 JUMPS = (0.0, 0.5, 1.0)
 """Slip jump that is tried, of the apparent stiction."""
-LAGS = (0.0, 0.05, 0.12, 0.3, 0.8, 4.0)
+LAGS = tuple((each, 0.0) for each in (0.0, 0.05, 0.12, 0.3, 0.8, 4.0))
 DELAYS = (0.0, 0.05, 0.1, 0.17, 0.25)
 """In cycles of the loop; a quarter of a cycle of delay and a quarter of lag is all that a PI loop leaves a process."""
 WAYS_ROUND = (*DELAYS[1:], 0.35, 0.5)
@@ -41,8 +42,14 @@ NEGATIVE_FEEDBACK = -1
 """Sign with which the loop answers its own output."""
 LONGER, LATER = (0.7, 1.0, 1.4), (-0.025, 0.0, 0.025)
 """Factors of the lag, and cycles of delay, about the best."""
+FIRST_LAG = 0.02
+"""In cycles, with which one is tried where there was none."""
+SECOND_LAG = 0.1
+"""In cycles, the longest second lag; up to it as long as the first. Where stems are coarse the delay stands for it."""
+STARTS = 8
+"""Stems of the coarse trials from which the best is sought: slips make the cost rough."""
 NEARER = ((0.12, 0.25), (0.05, 0.12), (0.02, 0.05))
-"""Steps of S, of itself, and of J, of S, about the best, one round after the other: slips make the cost rough."""
+"""Steps of S, of itself, and of J, of S, about the best, one round after the other."""
 ABOUT = (-2.0, -1.0, 0.0, 1.0, 2.0)
 MORE_WEIGHTS = 3.0
 """Nats that two more weights of a response cost, as a mean over what they may be would."""
@@ -50,10 +57,11 @@ MORE_WEIGHTS = 3.0
 
 @dataclass(frozen=True, slots=True)
 class Process:
-    """What a process makes of a stem: its cost, nats, less is better; lag and delay, rows of the stem; its gain."""
+    """What a process makes of a stem: its cost, nats, less is better; lags and delay, rows of the stem; its gain."""
 
     cost: float
     lag: float
+    second_lag: float
     delay: int
     gain: float
 
@@ -85,7 +93,7 @@ class Causes:
         costs: of the best of each cause, nats, less is better.
         evidence: for friction against the best of the others.
         friction: the best of it.
-        lag_s, delay_s, gain: of the process; the gain in PV a % of the output.
+        lag_s, delay_s, gain: of its process; what lags second counts as delay; the gain in PV a % of the output.
     """
 
     costs: dict[str, float]
@@ -148,14 +156,21 @@ class _Trials:
     costs: Array
     gains: Array
 
-    def best(self, among: npt.NDArray[np.bool_] | None = None) -> tuple[int, Process]:
-        """Return the place of the best stem, of those that may be, and its process."""
-        costs = self.costs if among is None else np.where(among[:, None, None], self.costs, np.inf)
-        stem, lag, delay = (int(each) for each in np.unravel_index(int(np.argmin(costs)), costs.shape))
+    @property
+    def least(self) -> Array:
+        """Cost of each stem with its best process, (g,)."""
+        return np.asarray(self.costs.min(axis=(1, 2)))
+
+    def process(self, stem: int) -> Process:
+        """Return the best process of a stem."""
+        lag, delay = (int(at) for at in np.unravel_index(int(np.argmin(self.costs[stem])), self.costs.shape[1:]))
+        first, second = self.lags[lag].tolist()
         at = (stem, lag, delay)
-        return stem, Process(
-            float(self.costs[at]), float(self.lags[lag]), int(self.delays[delay]), float(self.gains[at])
-        )
+        return Process(float(self.costs[at]), first, second, int(self.delays[delay]), float(self.gains[at]))
+
+    def best(self) -> Process:
+        """Return the best process of the best stem."""
+        return self.process(int(np.argmin(self.least)))
 
     @property
     def mean_likelihood(self) -> float:
@@ -169,21 +184,20 @@ def hold_causes(record: LoopRecord, oscillation: Oscillation, action: int) -> Ca
     rows = rows_of(record, oscillation)
     held = _hold(rows, action, DELAYS)
     friction = _refined(rows, held.trials, action)
-    linear = held.plain.best()[1]
+    process = friction.process
     costs = {
-        "friction": friction.process.cost,
-        "linear": min(held.alone, held.phases, linear.cost),
+        "friction": process.cost,
+        "linear": min(held.alone, held.phases, float(held.plain.costs.min())),
         "nonlinear": min(held.alone, held.curve),
         "disturbance": held.alone,
     }
-    best = friction.process if costs["friction"] < costs["linear"] else linear
     return Causes(
         costs,
         Evidence(held.witness, of_output(rows)),
         friction,
-        best.lag * rows.period_s,
-        best.delay * rows.period_s,
-        best.gain * rows.pv_unit / rows.output_pct,
+        process.lag * rows.period_s,
+        (process.second_lag + process.delay) * rows.period_s,
+        process.gain * rows.pv_unit / rows.output_pct,
     )
 
 
@@ -214,12 +228,9 @@ def _hold(rows: Rows, action: int, delays: Sequence[float]) -> _Held:
     none = np.zeros(1)
     processes = rows.cycle * np.array(LAGS), rows.cycle * np.array(delays)
     plain = _try(rows, none, none, none > 0.0, action, *processes)
-    sizes, ratios, manners = (
-        each.ravel()
-        for each in np.meshgrid(np.ptp(rows.output) * np.array(SHARES), JUMPS, [False, True], indexing="ij")
-    )
+    sizes, ratios, manners = _grid(np.ptp(rows.output) * np.array(SHARES), JUMPS, [False, True])
     trials = _try(rows, sizes, sizes * ratios, manners, action, *processes)
-    best = [plain.best()[1], trials.best()[1]]
+    best = [plain.best(), trials.best()]
     return _Held(
         plain,
         trials,
@@ -234,8 +245,8 @@ def _of_phases(rows: Rows, process: Process, action: int) -> float:
 
     It has any phase: no stem is preferred because a process has two lags, or the grid misses its own.
     """
-    delays = (process.delay + round(each * rows.cycle) for each in (0.0, 0.1, 0.2))
-    shapes = np.stack([respond(rows.output, rows.coarse, process.lag, each) for each in delays])
+    later = (round(each * rows.cycle) for each in (0.0, 0.1, 0.2))
+    shapes = np.stack([_response(rows, rows.output, process, each) for each in later])
     cost, weights = cost_of(shapes, rows.pv)
     return cost if weights.sum() * action >= 0.0 else np.inf
 
@@ -243,7 +254,7 @@ def _of_phases(rows: Rows, process: Process, action: int) -> float:
 def _of_curve(rows: Rows, process: Process, action: int) -> float:
     """Return the cost of a characteristic that rises, or falls, throughout."""
     output = rows.output
-    shapes = np.stack([respond(output**each, rows.coarse, process.lag, process.delay) for each in (1, 2, 3)])
+    shapes = np.stack([_response(rows, output**each, process) for each in (1, 2, 3)])
     cost, weights = cost_of(shapes, rows.pv)
     span = np.linspace(float(output.min()), float(output.max()), 50)
     slope = weights[0] + 2.0 * weights[1] * span + 3.0 * weights[2] * span**2
@@ -267,7 +278,7 @@ def fitted_path(record: LoopRecord, oscillation: Oscillation, friction: Friction
     pct, every = rows.output_pct, rows.coarse
     size, jump = friction.stiction_pct / pct, friction.slip_jump_pct / pct
     stem = rest_positions(rows.output, size, jump, friction.slides_on)
-    told = respond(stem, every, friction.process.lag, friction.process.delay)
+    told = _response(rows, stem, friction.process)
     weights = np.polyfit(told, rows.pv, 1)
     time_s = np.asarray(rows.period_s * every * (np.arange(rows.pv.size) + 0.5), np.float64)
     middle = float(record.op_pct.mean())
@@ -281,36 +292,46 @@ def fitted_path(record: LoopRecord, oscillation: Oscillation, friction: Friction
 
 
 def _refined(rows: Rows, trials: _Trials, action: int) -> Friction:
-    """Return the best stem, sought ever nearer from the best of each manner."""
-    span, tried, best = float(np.ptp(rows.output)), [trials], []
-    for manner in (False, True):
-        at, process = trials.best(trials.slides_on == manner)
-        size, jump = float(trials.stiction[at]), float(trials.slip_jump[at])
-        for step, jump_step in NEARER:
-            sizes, ratios = (
-                each.ravel()
-                for each in np.meshgrid(
-                    np.minimum(size * np.exp(step * np.array(ABOUT)), 0.98 * span),
-                    np.unique(np.clip(jump / size + jump_step * np.array(ABOUT[1:-1]), 0.0, 1.0)),
-                    indexing="ij",
-                )
-            )
-            lags = process.lag * np.array(LONGER) if process.lag else np.array([0.0, 0.02 * rows.cycle])
-            delays = process.delay + rows.cycle * np.array(LATER)
-            near = _try(rows, sizes, sizes * ratios, np.full(sizes.size, manner), action, lags, delays)
-            tried.append(near)
-            at, found = near.best()
-            if found.cost < process.cost:
-                size, jump, process = float(near.stiction[at]), float(near.slip_jump[at]), found
-        best.append((process.cost, size, jump, manner, process))
-    _, size, jump, manner, process = min(best, key=lambda each: each[0])
-    sizes, costs = (
-        np.concatenate(each) for each in zip(*((t.stiction, t.costs.min(axis=(1, 2))) for t in tried), strict=True)
-    )
-    inside = sizes[costs < process.cost + LIMITS.interval_cost]
+    """Return the best stem, sought ever nearer from the best few."""
+    starts = np.argsort(trials.least)[:STARTS].tolist()
+    tried = [trials, *(near for start in starts for near in _nearer(rows, trials, start, action))]
+    best = min(tried, key=lambda each: float(each.least.min()))
+    stem = int(np.argmin(best.least))
+    size, jump, process = float(best.stiction[stem]), float(best.slip_jump[stem]), best.process(stem)
+    inside = np.concatenate([t.stiction[t.least < process.cost + LIMITS.interval_cost] for t in tried])
     factor, pct = float(np.exp(LIMITS.least_interval)), rows.output_pct
     low, high = min(float(inside.min()), size / factor), max(float(inside.max()), size * factor)
-    return Friction(size * pct, low * pct, high * pct, jump * pct, manner, process)
+    return Friction(size * pct, low * pct, high * pct, jump * pct, bool(best.slides_on[stem]), process)
+
+
+def _nearer(rows: Rows, best: _Trials, stem: int, action: int) -> Iterator[_Trials]:
+    """Yield trials ever nearer about the best of a stem."""
+    for step, jump_step in NEARER:
+        process, size, jump = best.process(stem), best.stiction[stem], best.slip_jump[stem]
+        sizes, ratios = _grid(
+            np.minimum(size * np.exp(step * np.array(ABOUT)), 0.98 * np.ptp(rows.output)),
+            np.unique(np.clip(jump / size + jump_step * np.array(ABOUT[1:-1]), 0.0, 1.0)),
+        )
+        lags = _two_lags(np.array(LONGER) * (process.lag or FIRST_LAG * rows.cycle), rows.cycle)
+        delays = process.delay + rows.cycle * np.array(LATER)
+        near = _try(rows, sizes, sizes * ratios, np.full(sizes.size, best.slides_on[stem]), action, lags, delays)
+        yield near
+        if near.least.min() < process.cost:
+            best, stem = near, int(np.argmin(near.least))
+
+
+def _two_lags(lags: Array, cycle: float) -> Array:
+    """Return lags, each alone and with a second one, (2 l, 2)."""
+    return np.column_stack([np.tile(lags, 2), np.concatenate([0.0 * lags, np.minimum(lags, SECOND_LAG * cycle)])])
+
+
+def _grid(*axes: npt.ArrayLike) -> list[Any]:
+    """Return each with each of some axes' values, as columns."""
+    return [each.ravel() for each in np.meshgrid(*axes, indexing="ij")]
+
+
+def _response(rows: Rows, stem: Array, process: Process, later: int = 0) -> Array:
+    return respond(stem, rows.coarse, process.lag, process.second_lag, process.delay + later)
 
 
 def _try(

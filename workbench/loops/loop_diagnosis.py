@@ -67,12 +67,9 @@ class LoopDiagnosis(Result):
         """The whole in one line."""
         if self.verdict == "sticks":
             assert self.causes is not None
-            assert self.probability is not None
-            each = self.causes.friction
             return (
-                f"{self.record.name}: the valve sticks ({min(99.0, 100 * self.probability):.0f} %): apparent stiction "
-                f"{each.stiction_pct:.2g} % of the output ({each.low_pct:.2g} to {each.high_pct:.2g}), "
-                f"slip jump {each.slip_jump_pct:.2g} %"
+                f"{self.record.name}: the valve sticks ({self.sticks_said} %): apparent stiction "
+                f"{self.stiction_said} % of the output, slip jump {self.causes.friction.slip_jump_pct:.2g} %"
             )
         if self.verdict == "something else":
             return f"{self.record.name}: not the valve's friction: {self.cause}"
@@ -81,6 +78,19 @@ class LoopDiagnosis(Result):
             instead = "; ".join(dict.fromkeys(each.instead for each in self.gates))
             return f"{self.record.name}: insufficient: {said}; record {instead}"
         return f"{self.record.name}: cannot be told ({100 * (self.probability or 0.0):.0f} % sticks): {OPEN}"
+
+    @property
+    def sticks_said(self) -> str:
+        """Probability that it sticks, %, as people read it."""
+        return "–" if self.probability is None else f"{min(99.0, 100 * self.probability):.0f}"
+
+    @property
+    def stiction_said(self) -> str:
+        """S and its interval, % of the output, as people read them; of a valve that sticks."""
+        if self.verdict != "sticks" or self.causes is None:
+            return "–"
+        each = self.causes.friction
+        return f"{each.stiction_pct:.2g} ({each.low_pct:.2g} to {each.high_pct:.2g})"
 
     @property
     def advice(self) -> str:
@@ -98,25 +108,27 @@ class LoopDiagnosis(Result):
     def blocks(self) -> list[Block]:
         """Return the verdict, what to do, the causes, and the votes beside it."""
         advice = [self.advice] if self.advice else []
-        said: list[Block] = [self.sentence, *advice, *self.record.notes, self._motion(), self._law()]
-        if self.causes is not None:
-            least = min(self.causes.costs.values())
-            said.append(
-                Table(
-                    ("cause", "behind the best, nats"),
-                    [
-                        (name, f"{cost - least:.1f}")
-                        for name, cost in sorted(self.causes.costs.items(), key=lambda item: item[1])
-                    ],
-                )
-            )
-        if self.remedies:
-            rows = [(r.name, ratio(r.error_ratio), ratio(r.travel_ratio), r.settings) for r in self.remedies]
-            said.append(Table(("what to do", "error", "travel", ""), rows, REMEDIES))
-        said.append(
-            Table(("method of the literature", "index", ""), [(v.method, f"{v.index:.2f}", v.says) for v in self.votes])
-        )
-        return said
+        tables = (self.cause_table, self.remedy_table, self.vote_table)
+        said = [self.sentence, *advice, *self.record.notes, self._motion(), self._law()]
+        return [*said, *(each for each in tables if each.rows)]
+
+    @property
+    def cause_table(self) -> Table:
+        """Causes as they were held against each other; no rows where none was."""
+        costs = sorted(self.causes.costs.items(), key=lambda item: item[1]) if self.causes else []
+        return Table(("cause", "behind the best, nats"), [(name, f"{cost - costs[0][1]:.1f}") for name, cost in costs])
+
+    @property
+    def remedy_table(self) -> Table:
+        """What to do, and what it brings; no rows where nothing is."""
+        rows = [(r.name, ratio(r.error_ratio), ratio(r.travel_ratio), r.settings) for r in self.remedies]
+        return Table(("what to do", "error", "travel", ""), rows, REMEDIES)
+
+    @property
+    def vote_table(self) -> Table:
+        """What the literature's methods say."""
+        rows = [(each.method, f"{each.index:.2f}", each.says) for each in self.votes]
+        return Table(("method of the literature", "index", ""), rows)
 
     def _motion(self) -> str:
         each, record = self.oscillation, self.record
@@ -244,8 +256,7 @@ def _remedies(record: LoopRecord, oscillation: Oscillation, law: ControllerLaw, 
     error = record.pv - (record.pv.mean() if record.sp is None else record.sp)
     path = fitted_path(record, oscillation, causes.friction)
     noise = float(np.diff(path.pv - path.pv_fitted).std() / np.sqrt(2.0))
-    process = (causes.lag_s, causes.delay_s, causes.gain)
-    return find_remedies(float(np.sqrt((error**2).mean())), law, causes.friction, process, noise, record.period_s)
+    return find_remedies(float(np.sqrt((error**2).mean())), law, causes, noise, record.period_s)
 
 
 def _other(oscillation: Oscillation, setpoint: Oscillation | None, causes: Causes) -> str:

@@ -10,8 +10,9 @@ from typing import Any
 
 import numpy as np
 
+from config.results.block import Table
 from workbench.loops.causes import FittedPath, fitted_path
-from workbench.loops.loop_diagnosis import REMEDIES, LoopDiagnosis, ratio
+from workbench.loops.loop_diagnosis import REMEDIES, LoopDiagnosis
 from workbench.loops.loop_record import Array
 from workbench.loops.oscillation import without_trend
 from workbench.loops.plant import Plant
@@ -61,7 +62,7 @@ def report_loop(found: Sequence[LoopDiagnosis], path: Path) -> None:
         name, facts = f"loop-{count}", f"{each.record.pv.size} samples, one each {each.record.period_s:g} s"
         parts += [heading_alone(f"Loop {each.record.name}", facts), _verdict(each, name), _key_figures(each)]
         parts += _pictures(each, name, DRAWN)
-        parts += [section(f"{name}-tables", "Causes held against each other", _causes(each, name), _votes(each, name))]
+        parts += [section(f"{name}-tables", "Causes held against each other", _tables(each, name))]
     write(path, title, [*parts, section("words", "Words used here", glossary(WORDS))])
 
 
@@ -76,7 +77,7 @@ def report_loops(plant: Plant, path: Path, manifest: str) -> None:
         heading_alone(
             f"Loops of {manifest}", f"{len(plant.ranked)} loops: {counts}; {len(plant.unreadable)} unreadable"
         ),
-        section("ranking", "Ranking", _ranking(plant)),
+        section("ranking", "Ranking", _page_table("loops", plant.ranking)),
     ]
     if plant.groups:
         head = ("Loops", "Period, s", "Likeliest source", "Because")
@@ -84,7 +85,7 @@ def report_loops(plant: Plant, path: Path, manifest: str) -> None:
         parts.append(section("together", "Loops that oscillate together", table("groups", head, rows, (0, 2, 3))))
     for count, each in enumerate(plant.ranked[:MOST_DRILLED]):
         name = f"loop-{count}"
-        inside = [_verdict(each, name), *_pictures(each, name, FEWER), _causes(each, name), _votes(each, name)]
+        inside = [_verdict(each, name), *_pictures(each, name, FEWER), _tables(each, name)]
         parts.append(fold_parts(name, f"{count + 1}. {each.record.name}: {each.verdict}", *inside))
     if plant.unreadable:
         rows = [Row(each) for each in plant.unreadable]
@@ -95,67 +96,36 @@ def report_loops(plant: Plant, path: Path, manifest: str) -> None:
 COUNTED = {"sticks": "stick", "something else": "of another cause", "cannot be told": "that cannot be told"}
 
 
-def _ranking(plant: Plant) -> Html:
-    rows = [
-        Row(
-            (
-                str(rank),
-                each.record.name,
-                each.verdict,
-                _percent(each.probability),
-                _stiction(each),
-                f"{100 * each.variance_cost:.2g}",
-                each.cause or "; ".join(gate.says for gate in each.gates),
-            ),
-            kind="over" if each.verdict == "sticks" else "",
-        )
-        for rank, each in enumerate(plant.ranked, start=1)
-    ]
-    head = ("", "Loop", "Verdict", "Sticks, %", "Stiction, % of output", "Error's std, % of PV", "")
-    return table("loops", head, rows, (1, 2, 6))
-
-
-def _percent(probability: float | None) -> str:
-    return "–" if probability is None else f"{min(99.0, 100 * probability):.0f}"
-
-
-def _stiction(each: LoopDiagnosis) -> str:
-    friction = each.causes.friction if each.causes and each.verdict == "sticks" else None
-    return f"{friction.stiction_pct:.2g} ({friction.low_pct:.2g} to {friction.high_pct:.2g})" if friction else "–"
-
-
 def _verdict(each: LoopDiagnosis, name: str) -> Html:
     said = text(*filter(None, (each.advice, *each.record.notes)))
     if each.remedies:
-        rows = [Row((one.name, one.settings, ratio(one.error_ratio), ratio(one.travel_ratio))) for one in each.remedies]
-        head = ("What to do", "Settings", "Error, of now", "Travel, of now")
-        said = Html(said + table(f"{name}-remedies", head, rows, (0, 1)) + text(REMEDIES.rstrip(":") + "."))
+        said = Html(said + _page_table(f"{name}-remedies", each.remedy_table) + text(REMEDIES.rstrip(":") + "."))
     return verdict(KIND[each.verdict], each.sentence, said)
 
 
 def _key_figures(each: LoopDiagnosis) -> Html:
     return figures_of_merit(
         [
-            ("Sticks, %", Shown(_percent(each.probability)), "calibrated by loop"),
-            ("Apparent stiction, % of the output", Shown(_stiction(each)), "95 % interval"),
+            ("Sticks, %", Shown(each.sticks_said), "calibrated by loop"),
+            ("Apparent stiction, % of the output", Shown(each.stiction_said), "95 % interval"),
             ("Period, s", Shown(f"{each.oscillation.period_s:.4g}"), f"regularity {each.oscillation.regularity:.1f}"),
             ("Error's std, % of PV", Shown(f"{100 * each.variance_cost:.2g}"), "PV against set point"),
         ]
     )
 
 
-def _causes(each: LoopDiagnosis, name: str) -> Html:
+def _tables(each: LoopDiagnosis, name: str) -> Html:
+    votes = _page_table(f"{name}-votes", each.vote_table)
     if each.causes is None:
-        return text("No causes were compared: the record is insufficient.")
-    least = min(each.causes.costs.values())
-    ordered = sorted(each.causes.costs.items(), key=lambda item: item[1])
-    rows = [Row((cause, f"{cost - least:.1f}")) for cause, cost in ordered]
-    return table(f"{name}-causes", ("Cause", "Behind the best, nats"), rows)
+        return Html(text("No causes were compared: the record is insufficient.") + votes)
+    return Html(_page_table(f"{name}-causes", each.cause_table) + votes)
 
 
-def _votes(each: LoopDiagnosis, name: str) -> Html:
-    rows = [Row((vote.method, f"{vote.index:.2f}", vote.says)) for vote in each.votes]
-    return table(f"{name}-votes", ("Method of the literature", "Index", "Says"), rows, (0, 2))
+def _page_table(name: str, each: Table) -> Html:
+    words = [column for column in range(len(each.headings)) if each.is_words(column)]
+    head = [heading.capitalize() for heading in each.headings]
+    rows = [Row(tuple(row), kind="over" if "sticks" in row[:2] else "") for row in each.rows]
+    return table(name, head, rows, words)
 
 
 def _pictures(each: LoopDiagnosis, name: str, most: int) -> list[Html]:

@@ -22,6 +22,7 @@ import numpy as np
 
 from config.errors import InputError
 from config.plain_file import read_plain
+from config.results.block import Table
 from workbench.data.kept_results import KeptResults, key_of
 from workbench.imports.loop_reader import ROLES, read_loop
 from workbench.loops.causes import CAUSES_FORM, Causes
@@ -57,6 +58,22 @@ class Plant:
     ranked: tuple[LoopDiagnosis, ...]
     unreadable: tuple[tuple[str, str], ...]
     groups: tuple[Group, ...]
+
+    @property
+    def ranking(self) -> Table:
+        """A line a loop."""
+        rows = [
+            (
+                each.record.name,
+                each.verdict,
+                each.sticks_said,
+                each.stiction_said,
+                f"{100 * each.variance_cost:.2g}",
+                each.cause or "; ".join(gate.says for gate in each.gates),
+            )
+            for each in self.ranked
+        ]
+        return Table(("loop", "", "sticks, %", "stiction, % of output", "error's std, % of PV", ""), rows)
 
     def count(self, verdict: str) -> int:
         """Return how many loops have a verdict."""

@@ -15,7 +15,7 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
-from workbench.loops.causes import Friction
+from workbench.loops.causes import Causes
 from workbench.loops.controller_law import ControllerLaw
 
 SAMPLES = 3000
@@ -64,8 +64,7 @@ class _Loop:
 def find_remedies(
     record_error: float,
     law: ControllerLaw,
-    friction: Friction,
-    process: tuple[float, float, float],
+    causes: Causes,
     noise: float,
     period_s: float,
 ) -> tuple[Remedy, ...]:
@@ -74,21 +73,19 @@ def find_remedies(
     Args:
         record_error: rms of the control error on record.
         law: as seen.
-        friction: as found.
-        process: lag and dead time, s, and gain, of PV a %.
+        causes: friction and its process as found.
         noise: of PV, standard deviation.
         period_s: of the samples.
     """
-    lag_s, delay_s, gain = process
-    size, jump = friction.stiction_pct, friction.slip_jump_pct
+    size, jump, gain = causes.friction.stiction_pct, causes.friction.slip_jump_pct, causes.gain
     loop = _Loop(
         law.gain,
         law.gain * period_s / law.reset_s,
         0.5 * (size + jump),
         0.5 * (size - jump),
         gain,
-        float(np.exp(-period_s / max(lag_s, 1e-6 * period_s))),
-        max(1, round(delay_s / period_s)),
+        float(np.exp(-period_s / max(causes.lag_s, 1e-6 * period_s))),
+        max(1, round(causes.delay_s / period_s)),
         noise,
     )
     detuned = replace(loop, gain=0.5 * loop.gain, integral=0.5 * loop.integral)
@@ -117,12 +114,12 @@ def find_remedies(
         ),
     ]
     error, travel = _simulated(loop, _Policy())
-    if not 1.0 / CREDIBLE < error / max(record_error, 1e-12) < CREDIBLE:
-        return tuple(Remedy(name, settings, None, None) for name, settings, _, _ in cases)
+    credible = 1.0 / CREDIBLE < error / max(record_error, 1e-12) < CREDIBLE
     found = []
     for name, settings, changed, policy in cases:
         now, way = _simulated(changed, policy)
-        found.append(Remedy(name, settings, now / max(error, 1e-12), way / max(travel, 1e-12)))
+        ratios = (now / max(error, 1e-12), way / max(travel, 1e-12)) if credible else (None, None)
+        found.append(Remedy(name, settings, *ratios))
     return tuple(found)
 
 

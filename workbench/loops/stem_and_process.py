@@ -2,7 +2,7 @@
 
     |u - x| <= f_s    the stem rests                                          S = f_s + f_d, J = f_s - f_d
     |u - x| >  f_s    it slips and lands at  x = u - f_d sign(u - x)
-    T dz/dt = x(t - theta) - z                                                T long against a cycle: an integrator
+    T_1 dy/dt = x(t - theta) - y,    T_2 dz/dt = y - z                        T_1 long against a cycle: an integrator
     PV(t) = G z(t) + c + d(t),    d(t) = a_1 d(t-1) + ... + a_p d(t-p) + w(t),    w white of variance s^2
 
 u output, x stem, both in one unit. After a landing the stem sticks anew (He and others 2007), or slides on behind the
@@ -55,13 +55,15 @@ def rest_positions(output: Array, stiction: float, slip_jump: float, slides_on: 
 
 
 @compiled
-def respond(stem: Array, coarse: int, lag: float, delay: int) -> Array:
-    """Return what a process of gain one makes of a stem, (m,), in means of `coarse` rows; lag and delay in rows."""
+def respond(stem: Array, coarse: int, lag: float, second: float, delay: int) -> Array:
+    """Return what a process of gain one makes of a stem, (m,), in means of `coarse` rows; lags and delay in rows."""
     response = np.empty(stem.size // coarse)
     kept = np.exp(-1.0 / lag) if lag > 0.0 else 0.0
-    level, total = stem[0], 0.0
+    kept_second = np.exp(-1.0 / second) if second > 0.0 else 0.0
+    inner, level, total = stem[0], stem[0], 0.0
     for row in range(response.size * coarse):
-        level = kept * level + (1.0 - kept) * stem[max(0, row - delay)]
+        inner = kept * inner + (1.0 - kept) * stem[max(0, row - delay)]
+        level = kept_second * level + (1.0 - kept_second) * inner
         total += level
         if (row + 1) % coarse == 0:
             response[row // coarse] = total / coarse
@@ -202,20 +204,20 @@ def costs_of_stems(
         output: (m,), in rows of the stem.
         pv: (n,), in rows of the comparison, each `coarse` of the stem's.
         stiction, slip_jump, slides_on: of the stems, (g,).
-        lags: (l,), rows of the stem.
+        lags: first and second of each process, (l, 2), rows of the stem.
         delays: (d,), likewise.
         action: sign that the gain must have.
     """
     alone = cost_of(np.zeros((0, pv.size)), pv)[0]
-    costs = np.full((stiction.size, lags.size, delays.size), alone)
+    costs = np.full((stiction.size, lags.shape[0], delays.size), alone)
     gains = np.zeros_like(costs)
     for each in range(stiction.size):
         stem = rest_positions(output, stiction[each], slip_jump[each], slides_on[each])
         if _spread(stem) < LEAST_MOTION * _spread(output):
             continue
-        for at_lag in range(lags.size):
+        for at_lag in range(lags.shape[0]):
             for at_delay in range(delays.size):
-                response = respond(stem, coarse, lags[at_lag], delays[at_delay])
+                response = respond(stem, coarse, lags[at_lag, 0], lags[at_lag, 1], delays[at_delay])
                 cost, weights = cost_of(response.reshape((1, response.size)), pv)
                 if weights[0] * action >= 0.0:
                     costs[each, at_lag, at_delay], gains[each, at_lag, at_delay] = cost, weights[0]

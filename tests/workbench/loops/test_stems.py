@@ -26,9 +26,10 @@ def test_without_friction_the_stem_is_the_output() -> None:
 def test_the_process_and_the_stem_that_made_a_record_are_found_and_no_gain_against_the_action() -> None:
     rng = np.random.default_rng(1)
     output = np.sin(np.arange(600.0) / 15.0) * 4.0 + 0.1 * rng.standard_normal(600)
-    made = respond(rest_positions(output, 3.0, 1.0, False), 2, 6.0, 8)
+    made = respond(rest_positions(output, 3.0, 1.0, False), 2, 6.0, 3.0, 8)
     pv = 2.0 * made + 0.01 * rng.standard_normal(made.size)
-    sizes, lags, delays = np.array([0.0, 2.0, 3.0, 4.0]), np.array([0.0, 6.0, 12.0]), np.array([0, 8, 16])
+    sizes, delays = np.array([0.0, 2.0, 3.0, 4.0]), np.array([0, 8, 16])
+    lags = np.array([[6.0, 0.0], [6.0, 3.0], [6.0, 6.0]])
     jumps, manners = sizes / 3.0, np.zeros(4, np.bool_)
     costs, gains = costs_of_stems(output, pv, 2, sizes, jumps, manners, lags, delays, 1)
     best = np.unravel_index(np.argmin(costs), costs.shape)
