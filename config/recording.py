@@ -491,12 +491,16 @@ def _table(
     number, header = 0, ""
     for number, line in enumerate(lines, start=1):  # noqa: B007 - the number of the header line is used below
         header = line.strip()
+        if not header:
+            continue
         if not header.startswith("#"):
             break
         key, _, value = header.lstrip("# ").partition(":")
         metadata[key.strip()] = value.strip()
-    if not number:
+    if not header or header.startswith("#"):
         raise InputError(str(path), f"is empty; its first line should name the columns: {', '.join(required)}")
+    if "\0" in header:
+        raise csv.Error("no text")
     names = [name.strip() for name in header.split(",")]
     _require(path, required, names, f"line {number} names", or_required)
     whole = _Whole(lines, len(names))

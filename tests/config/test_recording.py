@@ -31,8 +31,9 @@ def test_every_bit_survives(tmp_path: Path) -> None:
         np.testing.assert_array_equal(read.columns[name], column)
 
 
-def test_an_empty_file_is_said_to_be_empty(tmp_path: Path) -> None:
-    (tmp_path / "rec.csv").write_text("")
+@pytest.mark.parametrize("text", ["", "\n \r\n", "# valve: v\n"])
+def test_an_empty_file_is_said_to_be_empty(tmp_path: Path, text: str) -> None:
+    (tmp_path / "rec.csv").write_text(text)
     with pytest.raises(InputError, match=r"is empty; its first line should name the columns: time_s, command_pa"):
         read_recording(tmp_path / "rec.csv")
 
@@ -47,6 +48,7 @@ def test_an_empty_cell_is_not_a_number_and_stays(tmp_path: Path) -> None:
     [
         ("time_s,command_pa\n0,1\n", "column position_m is missing; line 1 names: time_s, command_pa"),
         (HEADER, "holds no samples"),
+        ("MATLAB 5.0\0\0\0\n0,1\n", "is not a CSV file of ours: no text; `positioner import "),
         (HEADER + "0,1,2\n1,1\n2,1,1\n", "line 3: 2 values, the header names 3"),
         (HEADER + "0,1,2\n1,one,2\n", "line 3: 'one' is not a number"),
         ("# valve: v\n" + HEADER + "0,1,2\n0,1,2\n", "time_s must increase strictly: sample 2 (about line 4)"),

@@ -30,6 +30,16 @@ def test_the_true_valve_is_adequate(seed: int) -> None:
     assert not compared.slips.spurious_s
 
 
+@pytest.mark.parametrize("at_m", [0.0, 0.05, 0.0123])
+def test_a_position_that_is_the_same_throughout_has_no_fit(at_m: float) -> None:
+    """Its mean is off by a rounding, and no number stands for an error over nothing."""
+    valve, recording = drawn_valve(np.random.default_rng(0)), record_of(drawn_valve(np.random.default_rng(0)), 0)
+    columns = recording.columns | {"position_m": np.full(len(recording), at_m)}
+    compared = compare(Recording(columns, recording.metadata), valve)
+    assert compared.fit_percent == -np.inf
+    assert "fit none, " in compared.summary()
+
+
 def test_backlash_is_said_to_go_too_far_after_every_reversal() -> None:
     valve = drawn_valve(np.random.default_rng(2))
     compared = compare(record_of(with_effect(valve, "backlash", width_m=1.2e-3), 2), valve)

@@ -22,7 +22,7 @@ from signals.moves import Slip, slips
 from sim.composition import Composition
 from workbench.compare.comparison_sentences import Findings, Stretch, judge_findings, shorten_notes
 from workbench.compare.friction_balance import Forces, FrictionBalance, balance, forces, join_forces
-from workbench.compare.measures import fit_percent, rms, robust, valid_rows
+from workbench.compare.measures import fit_percent, fit_in_words, rms, robust, valid_rows
 from workbench.compare.phases import PHASES, phases
 from workbench.compare.residuals import (
     Correlation,
@@ -131,7 +131,7 @@ class Comparison(Result):
         """Say where the model fails, the gravest first, and by how much in each phase."""
         length = self.own.length
         return [
-            f"{self._judgement}: fit {self.fit_percent:.2f} %, error {length.said(self.rms_m, '.4g')} rms, "
+            f"{self._judgement}: fit {fit_in_words(self.fit_percent, 2)}, error {length.said(self.rms_m, '.4g')} rms, "
             f"{length.said(self.robust_m, '.4g')} robust, noise {say_m(self.noise_m, length)}"
             + ("" if self.repeatability_m is None else f", repeatability {length.said(self.repeatability_m, '.4g')}"),
             *(f"  {sentence}" for sentence in self.sentences),

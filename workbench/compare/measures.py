@@ -1,6 +1,7 @@
 """Figures of an error: fit percentage, rms, and a robust one that a single missed slip does not carry.
 
-fit = 100 (1 - ||y - x|| / ||y - mean y||)         as MATLAB's `compare`: x simulated, y measured position
+fit = 100 (1 - ||y - x|| / ||y - mean y||)         as MATLAB's `compare`: x simulated, y measured position, not the same
+                                                   throughout
 robust = median over 1 s blocks of the block's rms
 """
 
@@ -21,9 +22,15 @@ def fit_percent(record: Record, simulated_m: Column) -> float:
     """Return 100 (1 - ||y - y_hat|| / ||y - mean y||), Ljung's fit, of simulated positions, m, (n,)."""
     rows = valid_rows(record, simulated_m)
     measured_m = record.position_m[rows]
-    around = float(np.linalg.norm(measured_m - measured_m.mean()))
+    if not np.ptp(measured_m) > 0.0:
+        return -np.inf
     error = float(np.linalg.norm(simulated_m[rows] - measured_m))
-    return 100.0 * (1.0 - error / around) if around else -np.inf
+    return 100.0 * (1.0 - error / float(np.linalg.norm(measured_m - measured_m.mean())))
+
+
+def fit_in_words(percent: float, digits: int = 1) -> str:
+    """Return a fit percentage in words; of a position that is the same throughout there is none."""
+    return f"{percent:.{digits}f} %" if np.isfinite(percent) else "none"
 
 
 def rms(values: Column) -> float:

@@ -11,6 +11,7 @@ from webpage.telling import aside, errors_told
 from webpage.theme import Theme
 from workbench.compare.comparison import Comparison
 from workbench.compare.comparison_sentences import Stretch
+from workbench.compare.measures import fit_in_words
 from workbench.page.desk import SAVED, Desk
 from workbench.page.explained import word
 from workbench.page.findings_panel import FindingsPanel
@@ -159,7 +160,7 @@ class ComparePanel:
     def _tell(self, compared: Comparison) -> None:
         self._error.show(self._unit.fine(compared.rms_m))
         self._floor.show("unknown" if compared.floor_m is None else self._unit.fine(compared.floor_m))
-        self._fit.show(f"{compared.fit_percent:.1f} %")
+        self._fit.show(fit_in_words(compared.fit_percent))
         self._findings.show(compared)
 
     def _draw_marks(self) -> None:

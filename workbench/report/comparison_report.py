@@ -8,6 +8,7 @@ import numpy as np
 from config.recording import period_text
 from workbench.compare.comparison import ADEQUATE, Comparison, Phase
 from workbench.compare.comparison_sentences import shorten_notes
+from workbench.compare.measures import fit_in_words
 from workbench.report.charts import MEASURED, MODEL, Figure, correlation, profiles, spectrum
 from workbench.report.overlay import Simulated, overlay, phase_shades
 from workbench.report.page import (
@@ -124,7 +125,7 @@ def _key_figures(each: Comparison, stroke_m: float) -> Html:
                 floor,
             ),
             ("Error in floors", Shown(times(each.rms_m, each.floor_m)), f"a model that holds: at most {ADEQUATE:g} ×"),
-            ("Fit", Shown(f"{each.fit_percent:.1f} %"), "100 % is perfect"),
+            ("Fit", Shown(fit_in_words(each.fit_percent)), "100 % is perfect"),
             ("Slips matched", Shown(f"{len(each.slips.matched)}"), f"{missed} missed, {spurious} spurious"),
         ]
     )
@@ -353,7 +354,7 @@ def _pressure(each: Comparison) -> list[str]:
         f"The {read.title('actuator pressure')} is measured; the model's is off by "
         f"{read.kind.command.read.said(side.pressure_rms_pa)} rms. Run from the measured {read.kind.command.word} "
         f"instead of the command, the error is {read.said(side.stem_rms_m)} rms, "
-        f"fit {side.stem_fit_percent:.1f} %: that much arises at the stem"
+        f"fit {fit_in_words(side.stem_fit_percent)}: that much arises at the stem"
     ]
 
 
