@@ -69,6 +69,8 @@ Label = Annotated[str, AfterValidator(_label)]
 def _named(path: str) -> str:
     if "\0" in path or not path:
         raise ValueError("must be the name of a file or a folder")
+    if path.startswith("~"):
+        raise ValueError("~ is not read as a home folder: write it in full")
     return path
 
 

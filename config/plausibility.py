@@ -97,6 +97,15 @@ def _command_or_set_point(recording: Recording) -> _Asked | None:
     return None
 
 
+def odd_settings(stroke_m: float, most_pa: float) -> str:
+    """Return what is odd about a valve's stroke, m, and its largest command, Pa: those of other units; else nothing."""
+    if stroke_m > LONGEST_STROKE_M:
+        return f"a stroke of {stroke_m:g} m: is it in mm?"
+    if not LEAST_SPAN_PA < most_pa <= LARGEST_PA:
+        return f"commands of up to {most_pa:g} Pa: are they in bar, in kPa, or with a zero too many?"
+    return ""
+
+
 def odd_sizes(recording: Recording, stroke_m: float | None = None) -> list[str]:
     """Return what is odd about the sizes of a valve's numbers, a line each: those of other units, or of no value."""
     position_m, command_pa = recording.position_m, recording.columns.get("command_pa")

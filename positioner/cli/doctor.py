@@ -22,6 +22,10 @@ PERIODS, LEAST_PERIODS, TIMING_S = 500, 5, 5.0
 """Over which the machine's timing is watched: so many periods, or as many as fit into that time, at least a few."""
 
 
+OF_A_VALVE = ("law", "bus", "sampling", "recorder", "memory")
+"""Checks whose lines name the valve, where a file has several."""
+
+
 class FailedCheck(Exception):
     """A check that failed, and why."""
 
@@ -44,17 +48,13 @@ def run(arguments: argparse.Namespace) -> int:
     path = config_file(arguments)
     files = load_valves(path)
     well = _passes("packages", "", _packages)
-    for file in files:
-        travel = file.valve.travel
-        stroke = file.valve.plain.said(travel.stroke_m, "g")
-        print(f"{'config':12} ok    {path}: {file.valve.name}, stroke {stroke}, {travel.words}")
     nudge_pa: float | None = arguments.nudge_pa
     nudged = () if nudge_pa is None else (("sampling", partial(_sampling, nudge_pa)),)
     checks: list[tuple[str, Check, DaemonFile]] = [
         *(
             (name, check, file)
             for file in files
-            for name, check in (("law", _law), ("bus", _bus), *nudged, ("recorder", _recorder))
+            for name, check in (("law", _law), ("bus", _bus), *nudged, ("recorder", _recorder), ("memory", _memory))
         ),
         *(
             (name, check, files[0])
@@ -63,9 +63,11 @@ def run(arguments: argparse.Namespace) -> int:
         *((name, check, files[0]) for name, check in (("system", _system), ("priority", _priority))),
         *(("certificates", _certificates, file) for file in files),
     ]
+    for file in files:
+        well = _passes("config", "", partial(_config, file, path)) and well
     well = _passes("load", "", partial(_load, files)) and well
     for name, check, file in checks:
-        valve = f"{file.valve.name}: " if len(files) > 1 and name in ("law", "bus", "sampling", "recorder") else ""
+        valve = f"{file.valve.name}: " if len(files) > 1 and name in OF_A_VALVE else ""
         well = _passes(name, valve, partial(check, file, path)) and well
     return 0 if well else 1
 
@@ -86,6 +88,16 @@ def _packages() -> str:
     if said := in_the_way() or sharing():
         raise FailedCheck(said)
     return f"{', '.join(OWN)} are positioner's own, in {HOME}"
+
+
+def _config(file: "DaemonFile", path: Path) -> str:
+    from config.plausibility import odd_settings
+
+    travel = file.valve.travel
+    said = f"{path}: {file.valve.name}, stroke {file.valve.plain.said(travel.stroke_m, 'g')}, {travel.words}"
+    if odd := odd_settings(travel.stroke_m, file.pressure.maximum_pa):
+        raise FailedCheck(f"{said}; {odd}")
+    return said
 
 
 def _load(files: "Sequence[DaemonFile]") -> str:
@@ -208,22 +220,36 @@ def _certificates(file: "DaemonFile", _config: Path) -> str:
     return ", ".join(ends) or "none configured"
 
 
-def _recorder(file: "DaemonFile", config: Path) -> str:
+def _writable(folder: Path) -> Path:
+    """Return a folder that can be written, or made."""
     import os
 
-    if file.recorder is None:
-        return "none configured"
-    folder = config.parent / file.recorder.folder
     nearest = next(each for each in (folder, *folder.parents) if each.exists())
+    if not nearest.is_dir():
+        raise FailedCheck(f"{folder}: {nearest} is no folder")
     if not os.access(nearest, os.W_OK):
         raise FailedCheck(f"{folder}: cannot be written")
-    return f"{folder}, at most {file.recorder.keep_files * file.recorder.file_bytes / 1e6:.0f} MB"
+    return folder
+
+
+def _recorder(file: "DaemonFile", config: Path) -> str:
+    if file.recorder is None:
+        return "none configured"
+    most_mb = file.recorder.keep_files * file.recorder.file_bytes / 1e6
+    return f"{_writable(config.parent / file.recorder.folder)}, at most {most_mb:.0f} MB"
+
+
+def _memory(file: "DaemonFile", config: Path) -> str:
+    folders = (("what is known of the valve", file.memory.folder), ("its wear", file.health.folder))
+    kept = [f"{what} in {_writable(config.parent / each)}" for what, each in folders if each is not None]
+    return ", ".join(kept) or "none configured: a restart knows nothing of the last ([memory] folder)"
 
 
 def _history(file: "DaemonFile", config: Path) -> str:
     if file.history is None:
         return "none configured: nobody can say later who wrote a set point ([history] folder)"
-    return f"{config.parent / file.history.folder}: writes with peer and role, for {file.history.keep_days:g} days"
+    folder = _writable(config.parent / file.history.folder)
+    return f"{folder}: writes with peer and role, for {file.history.keep_days:g} days"
 
 
 def _timing(file: "DaemonFile", _config: Path) -> str:

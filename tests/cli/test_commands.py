@@ -20,6 +20,7 @@ import pytest
 import yaml
 
 import config
+from config.plausibility import odd_settings
 from config.recording import read_recording
 from config.registers import REGISTERS
 from positioner.cli.main import command_parser, main
@@ -177,6 +178,7 @@ def test_a_gateway_without_the_model_side_is_told_what_is_missing(missing: str, 
         ),
         ("[valve]\nstroke_m = 0\n", "valve.stroke_m: allowed is 1e-09 to 1e+06, got 0"),
         ("[valve]\n", "valve.stroke_m: is required and missing"),
+        ("[valve]\nstroke_m = 0.1\n[memory]\nfolder = '~/kept'\n", "memory.folder: ~ is not read as a home folder"),
         ("[valve\n", "is not valid TOML"),
     ],
 )
@@ -188,6 +190,23 @@ def test_a_wrong_daemon_file_is_one_line(tmp_path: Path, command: str, text: str
     line = one_line(capsys)
     assert line.startswith(f"positioner {command}: {path}: ")
     assert said in line
+
+
+def test_doctor_names_a_stroke_in_mm_commands_in_bar_and_a_folder_that_is_a_file(
+    tmp_path: Path, free_port: int, capsys: Capture
+) -> None:
+    path = tmp_path / "daemon.toml"
+    path.write_text(
+        f"[valve]\nstroke_m = 38.0\n[device]\nport = {free_port}\n[memory]\nfolder = 'daemon.toml'\n"
+        f"[supervisory]\nport = {free_port}\n"
+    )
+    assert main(["doctor", str(path)]) == 1
+    said = {line[:12].strip(): line[13:] for line in capsys.readouterr().out.splitlines()}
+    assert said["config"].startswith("FAILS ")
+    assert "38 m: is it in mm?" in said["config"]
+    assert said["memory"].startswith("FAILS ")
+    assert odd_settings(0.038, 4.2)
+    assert not odd_settings(0.1016, 420e3)
 
 
 def test_a_slave_that_is_not_there_is_one_line(tmp_path: Path, free_port: int, capsys: Capture) -> None:
