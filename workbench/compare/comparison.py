@@ -22,7 +22,7 @@ from signals.moves import Slip, slips
 from sim.composition import Composition
 from workbench.compare.comparison_sentences import Findings, Stretch, judge_findings, shorten_notes
 from workbench.compare.friction_balance import Forces, FrictionBalance, balance, forces, join_forces
-from workbench.compare.measures import fit_percent, fit_in_words, rms, robust, valid_rows
+from workbench.compare.measures import fit_in_words, fit_percent, rms, robust, valid_rows
 from workbench.compare.phases import PHASES, phases
 from workbench.compare.residuals import (
     Correlation,
