@@ -34,7 +34,7 @@ def test_the_true_valve_is_adequate(seed: int) -> None:
 def test_a_position_that_is_the_same_throughout_has_no_fit(at_m: float) -> None:
     """Its mean is off by a rounding, and no number stands for an error over nothing."""
     valve, recording = drawn_valve(np.random.default_rng(0)), record_of(drawn_valve(np.random.default_rng(0)), 0)
-    columns = recording.columns | {"position_m": np.full(len(recording), at_m)}
+    columns = {**recording.columns, "position_m": np.full(len(recording), at_m)}
     compared = compare(Recording(columns, recording.metadata), valve)
     assert compared.fit_percent == -np.inf
     assert "fit none, " in compared.summary()
