@@ -55,7 +55,7 @@ from positioner.control.restoration import Restoration
 from positioner.control.sample import Sample
 from positioner.control.settings import Settings
 from positioner.control.staircase_excitation import Staircase
-from positioner.control.states import law_inhibit_reason, situation_of, state_in
+from positioner.control.states import law_inhibit_reason, state_in
 from positioner.control.supervision import NO_FAULT, SupervisionMemory, supervise, usable
 from positioner.control.travel.course import OnCourse
 from positioner.control.travel.cutoffs import HIGH, WITHIN, sent_to_m
@@ -264,14 +264,10 @@ def _decide_anew(
         applied, law_before = _nothing_known(now, found)
     elif outcome is not None and outcome.landing and not playing:
         applied = memory.statics.corrected(found)
-    situation = situation_of(
-        automatic=mode is AUTOMATIC,
-        exciting=playing or exciting,
-        law_ready=applied.ratios is not None and not (excitation is not None and excitation.unanswered),
-        delta_r_m=reference.delta_m,
-        dropped=is_dropped,
+    is_ready = applied.ratios is not None and not (excitation is not None and excitation.unanswered)
+    state = state_in(
+        automatic=mode is AUTOMATIC, exciting=playing or exciting, is_ready=is_ready, delta_r_m=reference.delta_m
     )
-    state = state_in(situation)
     held_pa = _held_pa(now, state, supervision, law_before)
     following = state in FOLLOWING
     cut_off = settings.cutoffs.after(memory.last.cut_off, reference.value_m) if following else WITHIN
@@ -279,7 +275,7 @@ def _decide_anew(
     dead_band_m = _dead_band_m(now, applied)
     seen = _seen(now, reference, applied.ratios if follows else None, outcome, dead_band_m)
     one_direction = _knows_one_direction(settings, applied.ratios)
-    by_steps, law = _law(now, law_before, seen) if follows and one_direction else (0, law_before.observe(seen))
+    by_steps, law = _law(now, law_before, seen, one_direction=one_direction)
 
     asked_pa = _asked_pa(now, consumed, supervision, held_pa)
     if asked_pa is None:
@@ -289,7 +285,7 @@ def _decide_anew(
     commanded = _commanded(now, asked_pa, lead=not supervision.fault and follows)
     if commanded is None:
         supervision, state, held_pa = supervision.failed(settings.limits), S0, memory.wanted_pa
-        situation, law = situation._replace(automatic=False), settings.law.begin(held_pa)
+        law = settings.law.begin(held_pa)
         consumed = _consumed(now, supervision)
         commanded = _held_instead(now)
 
@@ -298,7 +294,8 @@ def _decide_anew(
     inhibit_reason = (
         excitation_inhibit
         or (NOTHING if playing or excitation is None else excitation.waits_for(memory.statics))
-        or (InhibitReason.RESTORED_WAITS if waits else law_inhibit_reason(situation))
+        or (InhibitReason.RESTORED_WAITS if waits else NOTHING)
+        or law_inhibit_reason(state, supervision.mode, is_ready=is_ready, is_dropped=is_dropped)
         or (by_law if settings.minimum_pa <= asked_pa <= settings.maximum_pa else InhibitReason.LAW_BEYOND_LIMITS)
     )
     decision = decision_of(
@@ -347,7 +344,7 @@ def _decide_anew(
 def _only_sees(memory: ControllerMemory, requests: Requests, settings: Settings) -> bool:
     """Whether a law follows its reference, and nothing is under way that goes by time or by what it learns."""
     last = memory.last
-    follows = last.state in FOLLOWING and last.cut_off == WITHIN and not last.one_direction
+    follows = last.state in FOLLOWING and last.cut_off == WITHIN and not memory.first_landing
     direct = settings.course is None and memory.path is None
     asked = 0 in requests.eta or last.experiment.commands or memory.excitation is not None
     return follows and direct and not (asked or last.restoration.provisional)
@@ -361,7 +358,8 @@ def _stands(now: Now, monitoring: MonitorMemory, supervision: SupervisionMemory)
     if now.stem_m is None or _outcome(now) is not None:
         return False
     seen = _seen(now, memory.reference, last.applied.ratios, None, _dead_band_m(now, last.applied))
-    if seen.dead_band_m != last.dead_band_m or memory.law.observe(seen) is not memory.law:
+    by_steps, law = _law(now, memory.law, seen, one_direction=last.one_direction)
+    if by_steps or law is not memory.law or seen.dead_band_m != last.dead_band_m:
         return False
     at_rest = memory.statics.detector.rest is not None
     memory.identification.look_on(sample.time_s, sample.position_m, sample.pressure_pa, at_rest=at_rest)
@@ -454,13 +452,13 @@ def _dead_band_m(now: Now, applied: Applied) -> float:
     return before_m if in_force_m == before_m else in_force_m
 
 
-def _law(now: Now, before: Law, seen: Seen) -> tuple[int, Law]:
+def _law(now: Now, before: Law, seen: Seen, *, one_direction: bool) -> tuple[int, Law]:
     """Return the law after this sample, and in which direction the stem goes by steps in its place, 0: it does not.
 
-    It commands, and knows friction of one direction.
+    So it goes where a law commands that knows friction of one direction.
     """
     memory, ratios = now.memory, seen.ratios
-    if ratios is None:
+    if ratios is None or not one_direction:
         return 0, before.observe(seen)
     unseen, at_m = ratios.directions.unseen, now.sample.position_m
     asked_anew = seen.reference_m != memory.reference.value_m

@@ -148,7 +148,7 @@ def climbed(
     stairs, law_valid = stairs.counted(outcome, settings.staircase), statics.law.valid
     if stairs.over(law_valid):
         if law_valid:
-            return replace(excitation, signal=replace(stairs, complete=True))
+            return excitation if stairs.complete else replace(excitation, signal=replace(stairs, complete=True))
         return replace(excitation, inhibit_reason=InhibitReason.STAIRCASE_IN_VAIN)
     if outcome is not None and stairs.unanswered(settings.staircase):
         return replace(excitation, inhibit_reason=InhibitReason.STAIRCASE_UNANSWERED)

@@ -2,8 +2,8 @@
 
 import pytest
 
-from config.codes import InhibitReason, State
-from positioner.control.states import Situation, law_inhibit_reason, state_in
+from config.codes import InhibitReason, Mode, State
+from positioner.control.states import law_inhibit_reason, state_in
 
 S0, S1, S2, S3 = State
 
@@ -28,6 +28,6 @@ TABLE = [
 def test_state_and_its_reason(
     automatic: bool, exciting: bool, ready: bool, delta: float, state: State, why: InhibitReason
 ) -> None:
-    situation = Situation(automatic, exciting, ready, delta)
-    assert state_in(situation) is state
-    assert law_inhibit_reason(situation) is why
+    assert state_in(automatic=automatic, exciting=exciting, is_ready=ready, delta_r_m=delta) is state
+    mode = Mode.AUTOMATIC if automatic else Mode.HOLD
+    assert law_inhibit_reason(state, mode, is_ready=ready, is_dropped=False) is why
