@@ -25,7 +25,7 @@ RESPONDS_TOO_EARLY = 0.2
 FAR = 5.0
 """Spans of all other positions between them and one that is no position."""
 HISTORIAN_GAP_PERIODS = 20.0  # a longer gap: the historian stored nothing
-MOVED = 0.02
+MOVED_SHARE = 0.02
 """Of the span of the positions: what counts as a move, and of the commands: as a change."""
 LONG_ROWS = 10
 """Rows for which a command is held, so that what the stem did before and after its change can be told apart."""
@@ -284,7 +284,7 @@ def _of_sampling(time_s: Column, position_m: Column, asked: _Asked) -> Iterator[
     if x.size < FEWEST_JUDGED_ROWS or np.ptp(u) == 0.0:
         return
     dx, du = np.diff(x), np.diff(u)
-    moves = np.abs(dx) > MOVED * np.ptp(x)
+    moves = np.abs(dx) > MOVED_SHARE * np.ptp(x)
     period_s = float(np.median(np.diff(t)))
     if ahead := _count_early_answers(x, u):
         yield (
@@ -293,7 +293,7 @@ def _of_sampling(time_s: Column, position_m: Column, asked: _Asked) -> Iterator[
         )
         return
     told_when = np.diff(np.flatnonzero(whole)) > 1  # a row of the command's own between two of the stem's
-    changes = np.flatnonzero((np.abs(du) > MOVED * np.ptp(u)) & ~told_when)
+    changes = np.flatnonzero((np.abs(du) > MOVED_SHARE * np.ptp(u)) & ~told_when)
     changes = changes[(changes > 0) & (changes < du.size - 1)]
     rested = changes[~moves[changes - 1]]
     early, late = int(moves[rested].sum()), int((moves[rested] | moves[rested + 1]).sum())
@@ -317,7 +317,7 @@ def _count_early_answers(x: Column, u: Column) -> tuple[int, int] | None:
 
     Its way is from where it was in the middle of the last hold to where it is in the middle of the next.
     """
-    changes = np.flatnonzero(np.abs(np.diff(u)) > MOVED * np.ptp(u)) + 1
+    changes = np.flatnonzero(np.abs(np.diff(u)) > MOVED_SHARE * np.ptp(u)) + 1
     bounds = np.concatenate([[0], changes, [u.size]])
     held = np.diff(bounds)
     middles = x[(bounds[:-1] + bounds[1:]) // 2]

@@ -18,7 +18,7 @@ POLL_S = 0.05
 COUNTS_EVERY = 5  # polls: counters change slowly
 REST_EVERY = 20
 """Polls from one to the next."""
-RETRY_S = 0.25
+POLL_AGAIN_S = 0.25
 REPLY_WITHIN_S = 0.5
 
 EACH_TIME = tuple(each.name for each in (*COMMANDS, *STATUS) if each.end <= MOST_REGISTERS)
@@ -57,7 +57,7 @@ class Poller:
                     self._poll(dcs)
             except (CommandFailed, InputError) as failed:  # a certificate may be replaced meanwhile
                 self.view.lose(time.monotonic(), str(failed))
-            self._stopping.wait(RETRY_S)
+            self._stopping.wait(POLL_AGAIN_S)
 
     def _poll(self, dcs: Dcs) -> None:
         """Poll until it fails or is stopped."""

@@ -18,7 +18,7 @@ from northbound.observer.waiting_reference import SAME_PU
 from northbound.observer.words import CODES, code_text
 from positioner.dcs import Dcs
 
-SAME = 1e-6
+FLOAT32_ERROR = 1e-6
 """Of a value that was written and the one that is read back: a float32 has 24 bits."""
 IDENTIFY_WITHIN_S = 600.0
 END_WITHIN_S = 5.0
@@ -63,7 +63,7 @@ def _as_read(name: str, value: float) -> str:
 def _confirm(name: str, value: float, read: float) -> Confirmation:
     """Return what became of a write, by what reads back."""
     said = _as_read(name, read)
-    if abs(read - value) <= SAME * max(1.0, abs(value)):
+    if abs(read - value) <= FLOAT32_ERROR * max(1.0, abs(value)):
         return Confirmation(True, f"{name} is {said}, as read back")
     return Confirmation(False, f"{name} was written, but reads back {said}")
 

@@ -57,12 +57,12 @@ ALPHA_PA, BETA_PA = 6.4 * PSI, 1.92 * PSI
 """The seed's excitation."""
 AGED_ALPHA_PA = 11.5 * PSI
 """Enough for the aged packing to break away from where the stem is then."""
-STEPS = (0.65, 0.40, 0.80, 0.50, 0.40)
+PAPER_STEPS = (0.65, 0.40, 0.80, 0.50, 0.40)
 """This valve's spring has no preload: without pressure it pulls the stem down only to F_c / k_s, 0.27 to 0.35 p.u."""
 SLIDES_STEPS = (0.65, 0.40)  # p.u.; both ways by the law of slides
 SMALL_STEPS = (0.41, 0.405, 0.43)
-"""All below the 5.3 % of stroke from which on the paper's law moves this stem; after the last of `STEPS`."""
-STEP_S = 0.5
+"""All below the 5.3 % of stroke from which on the paper's law moves this stem; after the last of `PAPER_STEPS`."""
+PAPER_STEP_S = 0.5
 SLIDES_STEP_S = 1.5
 """Slides leave small errors alone while references change within 1.2 s of each other."""
 SLIDES_PERIOD_S = 10e-3
@@ -291,16 +291,16 @@ def _play_paper(port: int, valve: "ValveParameters", powered_s: float) -> DemoOu
         steps = _steps(
             dcs,
             NEW,
-            STEPS,
+            PAPER_STEPS,
             limit_pu=LARGEST_ERROR_PU,
             by_steps_pu=by_steps_pu(valve),
             until_s=powered_s + AGES_AT_S,
         )
         _observe(dcs, AGES_AT_S + 0.5 - (time.monotonic() - powered_s), "the packing ages by 30 %")
-        steps += _steps(dcs, "aged", STEPS, limit_pu=None)
+        steps += _steps(dcs, "aged", PAPER_STEPS, limit_pu=None)
         aged = _age_packing(valve)
         identified += identify(dcs, "aged", AGED_ALPHA_PA, aged)
-        steps += _steps(dcs, "identified anew", STEPS, limit_pu=LARGEST_ERROR_PU, by_steps_pu=by_steps_pu(aged))
+        steps += _steps(dcs, "identified anew", PAPER_STEPS, limit_pu=LARGEST_ERROR_PU, by_steps_pu=by_steps_pu(aged))
         steps += _steps(dcs, SMALL, SMALL_STEPS, limit_pu=None)
         return DemoOutcome(steps, identified, {PAPER: _statistics(dcs)})
 
@@ -408,7 +408,7 @@ def _steps(
     limit_pu: float | None,
     by_steps_pu: float | None = None,
     until_s: float = math.inf,
-    step_s: float = STEP_S,
+    step_s: float = PAPER_STEP_S,
 ) -> list[StepOutcome]:
     """Make the steps; what is over after the packing has aged does not count for the packing that was identified."""
     steps = []
@@ -519,7 +519,7 @@ def _summary(outcome: DemoOutcome) -> str:
 
 
 def _sizes() -> str:
-    changes = [abs(now - then) for then, now in pairwise((STEPS[-1], *SMALL_STEPS))]
+    changes = [abs(now - then) for then, now in pairwise((PAPER_STEPS[-1], *SMALL_STEPS))]
     return ", ".join(f"{100 * change:.1f}" for change in changes)
 
 

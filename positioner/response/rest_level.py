@@ -18,9 +18,9 @@ from config.recording import Column
 
 _TO_SIGMA = 1.4826
 _OF_MEDIAN = 1.2533
-REST_SHARE = 0.2
+REST_END_SHARE = 0.2
 """The last part of a hold from which the rest is taken."""
-FEWEST_REST_SAMPLES = 5
+REST_SAMPLES = 5
 """Samples that a rest needs."""
 
 
@@ -36,8 +36,8 @@ class RestLevel:
 
 def rest_at_the_end(time_s: Column, position_m: Column, quantum_m: float) -> RestLevel | None:
     """Return where the stem rests in the last part of a hold, (n,), s and m; None with fewer than five samples."""
-    late = time_s >= time_s[-1] - REST_SHARE * (time_s[-1] - time_s[0])
-    count = max(int(late.sum()), FEWEST_REST_SAMPLES)
+    late = time_s >= time_s[-1] - REST_END_SHARE * (time_s[-1] - time_s[0])
+    count = max(int(late.sum()), REST_SAMPLES)
     if len(position_m) < count:
         return None
     t, x = time_s[-count:], position_m[-count:]

@@ -14,7 +14,7 @@ from dataclasses import dataclass
 from positioner.tests_on_the_valve.program import require_within
 
 HOURS_A_YEAR = 8766.0  # Julian
-SMALL = 0.1
+LINEAR = 0.1
 """lambda T up to which the formula's linear form holds within 5 %."""
 ASSUMPTIONS = (
     "one final element (1oo1), repair at once, dangerous failures at a constant rate",
@@ -64,7 +64,7 @@ class Credit:
     def lines(self) -> list[str]:
         """Return what may be claimed, by which formula and under which assumptions."""
         with_it, without = self.pfd_avg(tested=True), self.pfd_avg(tested=False)
-        limits = "" if self.rate_per_h * HOURS_A_YEAR * self.life_y < SMALL else " (upper bound: the rate is high)"
+        limits = "" if self.rate_per_h * HOURS_A_YEAR * self.life_y < LINEAR else " (upper bound: the rate is high)"
         return [
             f"PFD_avg {with_it:.3g} with this test every {365.25 * self.partial_y:.0f} days, {without:.3g} without it"
             f"{limits}",

@@ -13,7 +13,7 @@ from sim.composition import BASE, Composition
 
 FMI_VERSION = "2.0"
 IDENTIFIER = "valve"
-STEP_S = 1e-3
+FMU_STEP_S = 1e-3
 UNITS = {
     "_ns_per_m": ("N.s/m", {"kg": 1, "s": -1}),
     "_n_per_m": ("N/m", {"kg": 1, "s": -2}),
@@ -91,7 +91,7 @@ def model_description(composition: Composition, guid: str, tool: str) -> bytes:
     )
     all_of_it = variables(composition)
     _units(root, all_of_it)
-    ElementTree.SubElement(root, "DefaultExperiment", startTime="0", stopTime="10", stepSize=repr(STEP_S))
+    ElementTree.SubElement(root, "DefaultExperiment", startTime="0", stopTime="10", stepSize=repr(FMU_STEP_S))
     listed = ElementTree.SubElement(root, "ModelVariables")
     for reference, each in enumerate(all_of_it):
         _variable(listed, reference, each)

@@ -64,7 +64,11 @@ def test_it_ends_soon_and_leaves_picture_recording_and_figures(
     tmp_path: Path, capsys: pytest.CaptureFixture[str], monkeypatch: pytest.MonkeyPatch
 ) -> None:
     """Of each phase two steps, or a small one; the packing ages as soon as the first may be over."""
-    fewer = {"STEPS": demo.STEPS[:2], "SLIDES_STEPS": demo.SLIDES_STEPS[:1], "SMALL_STEPS": demo.SMALL_STEPS[:1]}
+    fewer = {
+        "PAPER_STEPS": demo.PAPER_STEPS[:2],
+        "SLIDES_STEPS": demo.SLIDES_STEPS[:1],
+        "SMALL_STEPS": demo.SMALL_STEPS[:1],
+    }
     for name, steps in fewer.items():
         monkeypatch.setattr(demo, name, steps)
     for module in (demo, simulated_plant):

@@ -90,7 +90,7 @@ def test_a_long_export_is_told_while_it_is_read_and_one_too_long_is_refused_at_o
     assert told[1][0] == "reading export.csv: 100 rows"
     assert told[1][1] == pytest.approx(0.5, abs=0.01)
     assert told[-1][0] == "understanding 200 rows"
-    monkeypatch.setattr(sample_rows, "MOST_ROWS", 150)
+    monkeypatch.setattr(sample_rows, "ROW_LIMIT", 150)
     told.clear()
     with pytest.raises(InputError, match=r"million rows, and an export is read up to .* split the file"):
         read_export(path, read_mapping(MAPPING), 0.1, progress=lambda what, done: told.append((what, done)))

@@ -83,13 +83,13 @@ def test_what_a_search_comes_to_is_not_for_the_page_that_was_loaded_again(workbe
 
 
 def test_of_many_closed_tabs_the_oldest_leave_nothing(workbench: "Workbench") -> None:
-    from workbench.page.page import MOST_LEFT
+    from workbench.page.page import MOST_EMPTY_DESKS
 
-    desks = [workbench.desk(f"tab {i}") for i in range(MOST_LEFT + 3)]
+    desks = [workbench.desk(f"tab {i}") for i in range(MOST_EMPTY_DESKS + 3)]
     for desk in desks:
         workbench.came(desk)
     for desk in desks:
         workbench.left(desk)
-    assert [desk.folder.exists() for desk in desks] == [False] * 3 + [True] * MOST_LEFT
+    assert [desk.folder.exists() for desk in desks] == [False] * 3 + [True] * MOST_EMPTY_DESKS
     workbench.clear()
     assert not any(desk.folder.exists() for desk in desks)

@@ -10,7 +10,7 @@ from config.recording import Recording
 from config.valve_file import valve
 from tests.workbench.fleets import record
 from workbench.compare.comparison import Comparison, compare
-from workbench.fleet.examination import AT_FLOOR, floors_allowed, is_at_floor, is_structured
+from workbench.fleet.examination import LOOK_FLOORS, floors_allowed, is_at_floor, is_structured
 
 NOISE_M = 5e-5
 SEED = valve("seed")
@@ -29,7 +29,7 @@ def compared(folder: Path, *, wave_m: float = 0.0, rows: int | None = None) -> C
 def test_what_goes_on_from_sample_to_sample_is_no_noise(tmp_path: Path, floors: float, explained: bool) -> None:
     found = compared(tmp_path, wave_m=floors * NOISE_M)
     assert found.adequate
-    assert found.rms_m < AT_FLOOR * (found.floor_m or 0.0), "the error alone would not tell"
+    assert found.rms_m < LOOK_FLOORS * (found.floor_m or 0.0), "the error alone would not tell"
     assert found.structured_m == pytest.approx(floors * NOISE_M, abs=0.12 * NOISE_M)
     assert is_structured(found) == (not explained)
     assert is_at_floor(found, SEED) == explained

@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 
 from workbench.compare.residuals import LONGEST_WINDOW, spectrum
-from workbench.data.motion import PARABOLA, acceleration_m_per_s2
+from workbench.data.motion import PARABOLA_ROWS, acceleration_m_per_s2
 
 PERIOD_S = 0.02
 
@@ -18,5 +18,5 @@ def test_the_spectrum_and_the_acceleration_are_those_of_scipy(count: int) -> Non
     found = spectrum(position_m, PERIOD_S)
     np.testing.assert_allclose(found.frequency_hz, frequency_hz)
     np.testing.assert_allclose(found.density_m2_per_hz, density, atol=1e-12 * density.max())
-    acceleration = savgol_filter(position_m, PARABOLA, 2, deriv=2, delta=PERIOD_S)
+    acceleration = savgol_filter(position_m, PARABOLA_ROWS, 2, deriv=2, delta=PERIOD_S)
     np.testing.assert_allclose(acceleration_m_per_s2(position_m, PERIOD_S), acceleration, atol=1e-9)

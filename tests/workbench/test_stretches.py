@@ -7,7 +7,7 @@ from config.recording import Recording
 from workbench.data.held_out import split
 from workbench.data.record import SLIP_ROWS, ready
 from workbench.data.stillness import eventful
-from workbench.data.stretches import FITTED_WORK, PARTS, informative
+from workbench.data.stretches import FITTED_WORK, STRETCHES, informative
 
 NOISE_M, HELD = 5e-5, 60
 FEW, MANY = 500, 1_500
@@ -42,9 +42,9 @@ def chosen(long: Recording) -> Recording:
 
 def test_stretches_are_spread_over_a_long_one_and_cost_what_is_allowed(long: Recording, chosen: Recording) -> None:
     record = ready(chosen)
-    assert len(record.segments) == PARTS
+    assert len(record.segments) == STRETCHES
     starts_s = chosen.time_s[[first for first, _ in record.segments]]
-    assert np.all(np.histogram(starts_s, PARTS, (0.0, long.time_s[-1]))[0] == 1)
+    assert np.all(np.histogram(starts_s, STRETCHES, (0.0, long.time_s[-1]))[0] == 1)
     rows = sum(int(eventful(record, record.command_pa, first, end).sum()) for first, end in record.segments)
     assert 0.8 * FITTED_WORK < rows + SLIP_ROWS * len(chosen) / HELD <= 1.05 * FITTED_WORK
 
@@ -62,7 +62,7 @@ def test_they_are_where_the_stem_travels_the_farthest_and_begin_and_end_at_rest(
 def test_what_was_left_out_is_told_once_and_no_gap(long: Recording) -> None:
     notes = split([long]).train.record.notes
     (told,) = [each for each in notes if each.startswith("not fitted: ")]
-    assert f" of {MANY * HELD} samples: of {MANY - 1} slips those of {PARTS} stretches" in told
+    assert f" of {MANY * HELD} samples: of {MANY - 1} slips those of {STRETCHES} stretches" in told
     assert not any("simulated anew" in each for each in notes)
 
 

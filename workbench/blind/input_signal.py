@@ -33,7 +33,7 @@ CLOSED, OPEN = (0.05, 0.3), (0.65, 0.97)
 """Parts of the stroke between which the moves go."""
 LENGTHS = (0.6, 1.6)
 """Range of the moves' lengths, relative to each other."""
-RESTS = (0.05, 0.35)
+REST_SHARES = (0.05, 0.35)
 """Range of the rest that ends a move, part of it."""
 
 
@@ -108,7 +108,7 @@ def _share_samples(generator: np.random.Generator, count: int, parts: int) -> li
 
 def _rest_after(move: Move, leg: Leg, generator: np.random.Generator) -> Column:
     """Make the move in a part of the leg's samples, and rest at its end; never below the atmosphere."""
-    moving = round((1.0 - generator.uniform(*RESTS)) * leg.count)
+    moving = round((1.0 - generator.uniform(*REST_SHARES)) * leg.count)
     made = move(replace(leg, count=moving), generator)
     return np.concatenate([made, np.full(leg.count - moving, leg.end_pa)]).clip(min=0.0)
 

@@ -45,7 +45,7 @@ if TYPE_CHECKING:
 ADEQUATE = 1.5
 NUMERICAL = 1e-6
 """Part of the stroke below which an error is none, whatever the noise."""
-CLEAR = 1.3
+DEPENDENCE_BANDS = 1.3
 """Times its 99 % band that a correlation with the input must reach at some lag to count as dependence."""
 
 
@@ -232,7 +232,7 @@ def compare_record(record: Record, valve: ValveFile) -> Comparison:
         rms_m=error_m,
         events=events,
         measured_slips=tuple(slip for each in segments for slip in each.measured),
-        depends_on_input=bool(np.max(np.abs(with_input.value)) > CLEAR * with_input.band),
+        depends_on_input=bool(np.max(np.abs(with_input.value)) > DEPENDENCE_BANDS * with_input.band),
         length=valve.valve.own.length,
         close=record.floor_m is not None
         and error_m <= max(ADEQUATE * record.floor_m, NUMERICAL * valve.valve.stroke_m),

@@ -19,10 +19,10 @@ from workbench.compare.phases import PHASES
 from workbench.compare.slip_matching import MatchedSlip, SlipEvents
 from workbench.data.noise_floor import UNKNOWN
 
-CERTAIN = 3.5
+CERTAIN_DEVIATIONS = 3.5
 MOVES = 20.0
 """What counts as motion, so many times: a stem that goes so far one way has moved, without a slip too; noise goes 9."""
-FEWEST_SLIPS = 3
+FEWEST_SLIPS_JUDGED = 3
 MOST_LISTED = 8
 """Notes listed one by one."""
 NAMED_PHASE_SHARE = 0.5
@@ -183,13 +183,13 @@ def _by_direction(
     means = {}
     for direction in (1, -1):
         part = np.array([value for pair, value in zip(pairs, values, strict=True) if pair.direction == direction])
-        if part.size >= FEWEST_SLIPS:
+        if part.size >= FEWEST_SLIPS_JUDGED:
             mean, error = float(np.median(part)), float(np.std(part, ddof=1)) / part.size**0.5
             if _certain(mean, error, matters):
                 means[direction] = mean
     if not means:
         pooled = np.array(values)
-        if pooled.size >= FEWEST_SLIPS and len({each.direction for each in pairs}) == 2:
+        if pooled.size >= FEWEST_SLIPS_JUDGED and len({each.direction for each in pairs}) == 2:
             mean, error = float(np.median(pooled)), float(np.std(pooled, ddof=1)) / pooled.size**0.5
             if _certain(mean, error, matters):
                 text = f"{when} {unit(abs(mean))} {words[0] if mean > 0 else words[1]}, both directions"
@@ -312,13 +312,13 @@ def _block_mean(found: Findings, rows: NDArray[np.bool_]) -> tuple[float, float]
     blocks = _blocks(found.time_s[rows])
     means = np.bincount(blocks, found.residual_m[rows]) / np.bincount(blocks)
     independent = min(means.size, len(found.measured_slips))
-    if independent < FEWEST_SLIPS:
+    if independent < FEWEST_SLIPS_JUDGED:
         return float(means.mean()), np.inf
     return float(means.mean()), float(np.std(means, ddof=1)) / independent**0.5
 
 
 def _certain(mean: float, error: float, matters: float) -> bool:
-    return abs(mean) > CERTAIN * error and abs(mean) > matters
+    return abs(mean) > CERTAIN_DEVIATIONS * error and abs(mean) > matters
 
 
 def _count(slips: int, kind: str = "") -> str:

@@ -15,7 +15,7 @@ from config.results.result import Brief
 from config.valve_file import ValveParameters
 from signals.moves import directions
 from workbench.compare.residuals import Profile, profile
-from workbench.data.motion import PARABOLA, acceleration_m_per_s2, velocity_m_per_s
+from workbench.data.motion import PARABOLA_ROWS, acceleration_m_per_s2, velocity_m_per_s
 
 
 @dataclass(frozen=True, slots=True, repr=False)
@@ -43,7 +43,7 @@ def forces(
     valve: ValveParameters, time_s: Column, position_m: Column, pressure_pa: Column, load_n: Column, noise_m: float
 ) -> Forces:
     """Reconstruct the friction of an unbroken stretch without NaN, arrays of (n,); none of fewer than nine samples."""
-    if time_s.size < PARABOLA:
+    if time_s.size < PARABOLA_ROWS:
         return Forces(*np.empty((6, 0)))
     velocity = velocity_m_per_s(time_s, position_m)
     period_s = float(np.median(np.diff(time_s)))

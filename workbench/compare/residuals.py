@@ -17,7 +17,7 @@ from config.recording import Column
 from config.results.result import Brief
 
 RESIDUAL_LAGS = 25
-NEXT = 5
+NOISELESS_LAGS = 5
 """Samples over which what is no noise goes on."""
 BAND_99 = 2.576  # deviations of a normal that 99 % lie within
 MEMORY = 0.2
@@ -56,7 +56,7 @@ class Correlation(Brief):
     @property
     def structured_share(self) -> float:
         """Part of the power that goes on from sample to sample, of an autocorrelation of two samples and more."""
-        return max(0.0, float(np.mean(self.value[(self.lag >= 1) & (self.lag <= NEXT)])))
+        return max(0.0, float(np.mean(self.value[(self.lag >= 1) & (self.lag <= NOISELESS_LAGS)])))
 
 
 @dataclass(frozen=True, slots=True, repr=False)

@@ -15,7 +15,7 @@ from config.recording import Column
 from config.results.result import Brief
 from signals.moves import Slip
 
-WITHIN = 0.4
+MATCH_SHARE = 0.4
 """Of the median time between slips: a match goes on within it."""
 CLEAR = 20.0
 """Standard deviations of the noise that a slip travels before it counts as missed or spurious."""
@@ -53,7 +53,7 @@ def match_slips(
     (ours, measured_m), (theirs, simulated_m) = measured, simulated
     begins = time_s[[each.first for each in ours]] if ours else time_s[:1]
     between_s = float(np.median(np.diff(begins))) if begins.size > 1 else float(time_s[-1] - time_s[0])
-    within_s = max(WITHIN * between_s, MATCHED_SAMPLES * float(np.median(np.diff(time_s))))
+    within_s = max(MATCH_SHARE * between_s, MATCHED_SAMPLES * float(np.median(np.diff(time_s))))
     pairs = []
     for i, slip in enumerate(ours):
         partner = _nearest(time_s, slip, theirs, within_s)

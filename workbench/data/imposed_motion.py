@@ -27,7 +27,7 @@ from config.results.result import Brief
 from config.valve_file import ValveParameters
 from signals.moves import legs
 from signals.noise import position_noise_m
-from workbench.data.motion import PARABOLA, acceleration_m_per_s2
+from workbench.data.motion import PARABOLA_ROWS, acceleration_m_per_s2
 from workbench.data.record import UNITS_PA, UNSEEN
 
 FORCES = ("time_s", "pressure_pa", "position_m", "load_n")
@@ -207,13 +207,13 @@ def _from_first_motion(recording: Recording, valve: ValveParameters) -> Rows:
     finite = np.all([np.isfinite(recording.columns[name]) for name in FORCES], axis=0)
     time_s, pressure_pa, position_m, load_n = (recording.columns[name][finite] for name in FORCES)
     notes = [] if finite.all() else [f"{int((~finite).sum())} samples hold what is not a number: left out"]
-    if time_s.size < max(BALANCE_ROWS, PARABOLA):
-        raise InputError("recording", f"{time_s.size} samples, at least {max(BALANCE_ROWS, PARABOLA)} are needed")
+    if time_s.size < max(BALANCE_ROWS, PARABOLA_ROWS):
+        raise InputError("recording", f"{time_s.size} samples, at least {max(BALANCE_ROWS, PARABOLA_ROWS)} are needed")
     if not np.all(np.diff(time_s) > 0.0):
         raise InputError("recording", "time_s must increase strictly")
     # A rig that never rests shows no noise: then what it sweeps says what motion is.
     noise_m = position_noise_m(position_m) or UNSEEN * float(np.ptp(position_m))
-    smooth_m = savgol_filter(position_m, PARABOLA, 2)
+    smooth_m = savgol_filter(position_m, PARABOLA_ROWS, 2)
     velocity = np.gradient(smooth_m, time_s)
     period_s = float(np.median(np.diff(time_s)))
     inertia_n = valve.mass_kg * acceleration_m_per_s2(position_m, period_s)

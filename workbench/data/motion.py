@@ -8,7 +8,7 @@ import numpy as np
 from config.recording import Column
 
 REACH = 2  # samples to either side of which a velocity is made
-PARABOLA = 9
+PARABOLA_ROWS = 9
 """Samples of a local parabola, from which accelerations come."""
 
 
@@ -29,10 +29,10 @@ def acceleration_m_per_s2(position_m: Column, period_s: float) -> Column:
     """Return the acceleration at each sample, m/s^2, (n,), by local parabolas; at the ends that of the outermost one.
 
     Args:
-        position_m: m, (n,), at least `PARABOLA` samples.
+        position_m: m, (n,), at least `PARABOLA_ROWS` samples.
         period_s: between samples, s.
     """
     from scipy.signal import savgol_filter  # takes as long to load as all else together
 
-    acceleration: Column = savgol_filter(position_m, PARABOLA, 2, deriv=2, delta=period_s)
+    acceleration: Column = savgol_filter(position_m, PARABOLA_ROWS, 2, deriv=2, delta=period_s)
     return acceleration

@@ -30,7 +30,7 @@ NOISE = "noise_m"
 """Key under which a recording says its noise."""
 REPEATS = 1e-3
 """A command repeats if its rms difference over the lag is below this part of its rms deviation."""
-AGREED, WITHIN = 10, 4.0
+AGREED, LAP_DEVIATIONS = 10, 4.0
 """Samples, and deviations of the noise, in which two laps are seen to agree."""
 BY_CHANCE = 1e-4
 """Chance of what laps have in common in direction of motion, below which it is a change of friction and no scatter."""
@@ -185,7 +185,7 @@ def _is_beyond_chance(whole_m: Column, left_m: Column, count: int) -> bool:
 
 def _agreed(before_m: Column, after_m: Column, noise_m: float) -> int:
     """Return from where on two laps have agreed, or rested after a move of both; 0 if they never do."""
-    near = np.abs(after_m - before_m) <= WITHIN * 2.0**0.5 * noise_m
+    near = np.abs(after_m - before_m) <= LAP_DEVIATIONS * 2.0**0.5 * noise_m
     together = np.convolve(near, np.ones(AGREED), "valid") == AGREED
     agreed = int(np.argmax(together)) if together.size else 0
     moving = np.array([directions(each, noise_m) != 0 for each in (before_m, after_m)])

@@ -2,10 +2,10 @@
 
     work = rows that tell something + 20 slips        what a simulation costs (`stillness`, `motion`)
 
-A recording whose work is no more than `FITTED_WORK` is fitted whole. A longer one is divided into `PARTS` of equally
-many rows, and in each the unbroken stretch is taken in which the stem travels the farthest, of those that cost no more
-than their share. A stretch begins and ends in the middle of a rest, so that the model begins at rest, too, and what
-lags has settled. Where nothing moves, nothing is taken. A column of its own, `stretch`, counts them.
+A recording whose work is no more than `FITTED_WORK` is fitted whole. A longer one is divided into `STRETCHES` of
+equally many rows. In each the unbroken stretch is taken in which the stem travels the farthest, of those that cost no
+more than their share. A stretch begins and ends in the middle of a rest, so that the model begins at rest, too, and
+what lags has settled. Where nothing moves, nothing is taken. A column of its own, `stretch`, counts them.
 """
 
 from collections.abc import Iterator, Sequence
@@ -21,7 +21,7 @@ from workbench.data.stillness import eventful
 
 FITTED_WORK = 40_000
 """Of what is fitted and held out together."""
-PARTS = 24  # stretches, evenly over the record
+STRETCHES = 24  # stretches, evenly over the record
 NAMED = 3
 """Stretches that are told with their times; of more, the first."""
 
@@ -67,8 +67,8 @@ def _moves(record: Record, first: int, end: int) -> Iterator[Move]:
 
 def _stretches(moves: Sequence[Move], count: int) -> Iterator[tuple[int, int]]:
     """Yield the rows of each stretch, half open, in order."""
-    for part in range(PARTS):
-        here = [move for move in moves if PARTS * move.first // count == part]
+    for part in range(STRETCHES):
+        here = [move for move in moves if STRETCHES * move.first // count == part]
         if here:
             yield _farthest(here)
 
@@ -84,7 +84,7 @@ def _farthest(moves: Sequence[Move]) -> tuple[int, int]:
         if begin < last and move.first != moves[last - 1].end:
             begin, work, travel_m = last, 0.0, 0.0
         work, travel_m = work + move.work, travel_m + move.travel_m
-        while begin < last and work > FITTED_WORK / PARTS:
+        while begin < last and work > FITTED_WORK / STRETCHES:
             work, travel_m = work - moves[begin].work, travel_m - moves[begin].travel_m
             begin += 1
         if travel_m > most_m:

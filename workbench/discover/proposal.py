@@ -26,7 +26,7 @@ from workbench.select.tangent_preview import Tangents
 BEST = 2
 """Points that each of the two gives a fit to begin with."""
 
-LEAST_REST = 1e-9
+LEAST_SHARE_LEFT = 1e-9
 """Of what is left: a share that is all of it promises no more than this does."""
 
 Point = tuple[float, ...]
@@ -73,7 +73,7 @@ def propose_forms(
 def _promise_evidence(effect: Effect, share: float, base: Fit) -> float:
     """Return the evidence that a share of what is left, from 0 to 1, promises."""
     n, fitted = base.terms.events, sum(not each.given for each in effect.parameters.values())
-    return -n * log(max(1.0 - share, LEAST_REST)) - fitted * log(n)
+    return -n * log(max(1.0 - share, LEAST_SHARE_LEFT)) - fitted * log(n)
 
 
 def _begins(effect: Effect, points: list[Point], shares: tuple[list[float], list[float]]) -> tuple[Point, ...]:

@@ -42,12 +42,12 @@ LEAST_CHANGE = 0.05
 """Of a parameter: what differs by less has not changed, however narrow its interval."""
 LEAST_CHANGE_OF_EFFECT = 0.2
 """The same of an effect's: two recordings of one play gave 3.81 and 4.08 mm, intervals of 0.01 mm about a stair."""
-AT_FLOOR = 1.1
+LOOK_FLOORS = 1.1
 """Times the floor that a look or a refit may leave of many samples; more is diagnosed. `python -m
 benchmarks.fleet_triage` has what each value misses."""
-BY_CHANCE = 5.0
+CHANCE_RISE = 5.0
 """Some four standard deviations of e / floor, times sqrt n: floors are estimated, too, from the samples at rest."""
-STRUCTURED = 0.3
+STRUCTURE_FLOORS = 0.3
 """Times the floor that the structured part of the error may have."""
 RISEN = 1.25
 """Times the floor of the recording behind the model: a floor that lies higher is itself something new. Laps that differ
@@ -223,7 +223,7 @@ def is_at_floor(comparison: Comparison, model: ValveFile, known_floor_m: float |
 
 def floors_allowed(samples: int) -> float:
     """Return how many floors a look or a refit may leave of so many samples."""
-    return max(AT_FLOOR, 1.0 + BY_CHANCE / float(np.sqrt(samples)))
+    return max(LOOK_FLOORS, 1.0 + CHANCE_RISE / float(np.sqrt(samples)))
 
 
 def is_structured(comparison: Comparison, known_floor_m: float | None = None) -> bool:
@@ -236,7 +236,7 @@ def is_structured(comparison: Comparison, known_floor_m: float | None = None) ->
     noise_m, floor_m = comparison.noise_m, floor_to_reach_m(comparison, known_floor_m)
     if noise_m is None or floor_m is None or (known_floor_m or floor_m) > RISEN * noise_m:
         return False
-    return comparison.structured_m > STRUCTURED * floor_m
+    return comparison.structured_m > STRUCTURE_FLOORS * floor_m
 
 
 def floor_to_reach_m(comparison: Comparison, known_floor_m: float | None) -> float | None:

@@ -21,7 +21,7 @@ from workbench.fleet.valve_course import ValveCourse, valve_in
 if TYPE_CHECKING:
     from matplotlib.figure import Figure
 
-MOST_LINES = 30  # of a summary: a screen
+SUMMARY_LINES = 30  # of a summary: a screen
 Told = Callable[[str, Entry, Examination], None]
 
 
@@ -83,9 +83,9 @@ class Fleet(Result):
             f"{self.examined} of them examined now, {len(self.bad)} unreadable"
         ]
         if rows:
-            said.append(Table(head, rows[:MOST_LINES]))
-        if len(rows) > MOST_LINES:
-            said.append(f"and {len(rows) - MOST_LINES} more")
+            said.append(Table(head, rows[:SUMMARY_LINES]))
+        if len(rows) > SUMMARY_LINES:
+            said.append(f"and {len(rows) - SUMMARY_LINES} more")
         said += [f"{name}: {entry.recording}: {reason}" for name, entry, reason in self.bad]
         return said
 

@@ -31,7 +31,7 @@ NOT_JUDGED, NOTHING_KNOWN = "not judged", "nothing known"
 JUDGED = ("missing", "one_of", "unexplained", CHANGED)
 """Outcomes that say what it is, or that the library has nothing for it."""
 SPRING, COULOMB = "spring_n_per_m", "coulomb_n"
-LIKE = 0.05
+LIKE_FACTORS = 0.05
 """Relative difference of two factors that are taken for one."""
 LEAST_STEPS = 2
 """Changes one way, one after the other, that are a drift."""
@@ -180,7 +180,7 @@ def kinds_of_changes(changes: Sequence[Change]) -> list[str]:
     factors = {each.name: each.now / each.before for each in changes if each.before}
     if SPRING not in factors:
         return [complaint_of(each.name) for each in changes]
-    if COULOMB in factors and abs(factors[COULOMB] / factors[SPRING] - 1.0) < LIKE:
+    if COULOMB in factors and abs(factors[COULOMB] / factors[SPRING] - 1.0) < LIKE_FACTORS:
         return ["air supply or leak"]
     others = [complaint_of(each.name) for each in changes if each.name != SPRING]
     return ["lost calibration", SPRING_OR_DIAPHRAGM, *others]

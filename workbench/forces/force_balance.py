@@ -50,7 +50,7 @@ SHAPES: Mapping[str, tuple[float, ...]] = {
 }
 """What is tried of a law's shape: velocities, in median speeds, and exponents."""
 PRESLIDING = "presliding"
-SMALL = 1e-6
+DERIVATIVE_STEP = 1e-6
 """Of a strength, for the derivative of a law by it."""
 ALONE = 1e-6
 """Share of a term that no combination of the bare balance's makes up, below which it is none."""
@@ -131,10 +131,10 @@ class Term:
         at = [given[each].tolist() for each in named if each != "q"]
         readings = list(zip(*at, strict=True)) or [()] * len(rows)
 
-        q = law.parameters(**dict(self.shape), **{self.strength: self.unit * SMALL})
+        q = law.parameters(**dict(self.shape), **{self.strength: self.unit * DERIVATIVE_STEP})
         found = [law.function(*each, q) for each in readings]
         # Without strength it vanishes: no force, and the friction that it was given.
-        return (np.array([each[0] for each in found]) - one if self.is_friction else np.array(found)) / SMALL
+        return (np.array([each[0] for each in found]) - one if self.is_friction else np.array(found)) / DERIVATIVE_STEP
 
 
 @dataclass(frozen=True, slots=True)

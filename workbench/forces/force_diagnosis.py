@@ -31,7 +31,7 @@ from workbench.select.forward_selection import MOST_ADDED, Candidate, ForwardSel
 if TYPE_CHECKING:
     from matplotlib.figure import Figure
 
-AT_FLOOR = 1.25
+BALANCE_FLOORS = 1.25
 """A balance reaches the floor if its median error is within this of what strokes differ by among themselves."""
 
 
@@ -127,7 +127,7 @@ def _search(balance: Balance) -> ForceDiagnosis:
         step = _step(len(steps) + 1, fit, {name: fitted for name, (_, fitted) in found.items()}, library)
         if steps:
             steps[-1] = without_missing(steps[-1], step, library)
-        explained = floor_n is not None and fit.median_error_n <= AT_FLOOR * floor_n
+        explained = floor_n is not None and fit.median_error_n <= BALANCE_FLOORS * floor_n
         if len(steps) == MOST_ADDED or (steps and explained):
             break
         steps.append(step)
@@ -181,7 +181,7 @@ def _verdict(
     before_n, after_n = steps[0].before.test_rms_n, best.test_rms_n
     fell = f"the held-out error falls from {before_n:.3g} to {after_n:.3g} N"
     rivals = "".join(rivals_sentence([each.name for each in step.indistinguishable], library) for step in steps)
-    if floor_n is not None and best.median_error_n > AT_FLOOR * floor_n:
+    if floor_n is not None and best.median_error_n > BALANCE_FLOORS * floor_n:
         part = f" A part of it is {names}: {fell}.{rivals}" if names else f" The held-out error is {after_n:.3g} N."
         return "unexplained", (
             f"Something is left that the balance does not explain: it is off by {best.median_error_n:.3g} N, where "

@@ -51,7 +51,7 @@ BASES = (
 )
 LARGEST_CLOCK_NUMBER = 1e19
 """Numbers of a clock: nanoseconds of 300 years."""
-SURELY = 1e10
+NEVER_SECONDS = 1e10
 """Numbers from which on a mapping that says another unit is wrong: 300 years of seconds."""
 
 
@@ -137,7 +137,7 @@ def clock_of(
     unit, base = said or "s", time_base(raw)
     if base is None:
         return Clock(raw * UNITS["_s"][unit], None)
-    if base.unit != unit and (said is None or abs(raw[0]) > SURELY):
+    if base.unit != unit and (said is None or abs(raw[0]) > NEVER_SECONDS):
         problem = f"{cells[0]!r} in {theirs!r} is no time in {'seconds' if unit == 's' else unit}"
         raise InputError(str(path), f"{problem}: type {option}{theirs}:{base.unit}, {base.words}")
     factor = UNITS["_s"][unit]

@@ -22,7 +22,7 @@ from workbench.imports.turned_tables import signals_in, table_of_signal, turn_ta
 LOOKED_AT = 200  # rows that are read to say what a column holds
 MOST_SHOWN = 5
 """Words of a status that are shown."""
-WIDEST = 24
+WIDEST_CELL = 24
 """Characters of a cell that are shown."""
 GOOD = "192"
 """What OPC calls good, where qualities are numbers."""
@@ -78,7 +78,7 @@ class ColumnPreview:
 def show_cell(cell: Cell) -> str:
     """Return a cell as it is shown, in one short line."""
     text = f"{cell:.10g}" if isinstance(cell, float) else cell.replace("\n", " ")
-    return text if len(text) <= WIDEST else text[: WIDEST - 2] + ".."
+    return text if len(text) <= WIDEST_CELL else text[: WIDEST_CELL - 2] + ".."
 
 
 def find_decimal(columns: Sequence[ColumnPreview], separator: str) -> tuple[str, str]:

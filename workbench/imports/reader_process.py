@@ -28,7 +28,7 @@ from workbench.imports.typed_tables import Columns
 Groups = list[tuple[str, Columns]]
 """Columns of float64 by their names, of each group, by its name."""
 REFUSED = 2  # exit status of a file that is refused, as of every command
-LONGEST_S, BYTES_A_S = 20.0, 1e6
+LONGEST_READ_S, BYTES_A_S = 20.0, 1e6
 """Of the processor, for which it may read; more of a large file. The slowest library takes a tenth of a second for a
 megabyte."""
 
@@ -46,7 +46,7 @@ def read_apart(path: Path, module: str, kind: str) -> Groups:
     """
     with tempfile.TemporaryDirectory(prefix="positioner-read-") as folder:
         into = Path(folder) / "read.npz"
-        limit_s = LONGEST_S + path.stat().st_size / BYTES_A_S
+        limit_s = LONGEST_READ_S + path.stat().st_size / BYTES_A_S
         words = [sys.executable, "-P", "-m", module, str(path.absolute()), str(into), f"{limit_s:.0f}"]
         try:
             ended = subprocess.run(

@@ -12,7 +12,7 @@ from workbench.imports.header_search import Header
 from workbench.imports.raw_table import Cell
 
 Progress = Callable[[str, float], None]
-MOST_ROWS = 3_000_000
+ROW_LIMIT = 3_000_000
 """Of an export: a minute of reading, and some hundred bytes of memory a cell."""
 TOLD_EVERY = 50_000
 """Rows."""
@@ -73,10 +73,10 @@ def collect_samples(path: Path, header: Header, clock: str | None, tell: Progres
 
 
 def _require_few(path: Path, rows: int) -> None:
-    if rows > MOST_ROWS:
+    if rows > ROW_LIMIT:
         raise InputError(
             str(path),
-            f"has {rows / 1e6:.3g} million rows, and an export is read up to {MOST_ROWS / 1e6:g} million: export a "
+            f"has {rows / 1e6:.3g} million rows, and an export is read up to {ROW_LIMIT / 1e6:g} million: export a "
             "shorter stretch, or split the file",
         )
 

@@ -24,7 +24,7 @@ from workbench.data.record import Record, require_units
 from workbench.model.free_run import FreeRun, Run
 from workbench.model.parameters import Parameter, free_parameters
 
-WITHIN = 10.0
+SLIDER_FACTOR = 10.0
 """A parameter of the bare valve: slider from this part of the valve file's value to this many times it."""
 STRONGEST = 4.0
 """An effect's: slider to so many times its strongest start, away from where it vanishes."""
@@ -214,7 +214,7 @@ class LiveModel:
         if parameter.name == "static_n":
             return parameter  # a ratio
         if not effect:
-            low, high = value / WITHIN, value * WITHIN
+            low, high = value / SLIDER_FACTOR, value * SLIDER_FACTOR
         else:
             declared = next(each for each in self._composition.effects if each.name == effect).parameters[key]
             low, high = _reach(parameter.starts, declared.off, positive=parameter.least > 0.0)

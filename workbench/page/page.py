@@ -17,7 +17,7 @@ from workbench.page.opening import Opened, open_file
 from workbench.page.search_panel import SearchPanel
 
 TITLE = "positioner workbench"
-MOST_LEFT = 10
+MOST_EMPTY_DESKS = 10
 """Desks that are kept though nobody sits at them: a page may be opened again."""
 
 
@@ -93,7 +93,7 @@ class Workbench:
             return
         desk.stop()
         left = [tab for tab, each in self._desks.items() if not each.pages]
-        for tab in left[:-MOST_LEFT]:
+        for tab in left[:-MOST_EMPTY_DESKS]:
             self._desks.pop(tab).clear()
 
 

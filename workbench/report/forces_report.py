@@ -9,7 +9,7 @@ from config.recording import Column
 from workbench.compare.residuals import BINS, FEWEST_BIN_ROWS, Profile, profile
 from workbench.data.imposed_motion import Rows
 from workbench.forces.force_balance import ForceFit, balanced_n, carried_n
-from workbench.forces.force_diagnosis import AT_FLOOR, ForceDiagnosis, ForceStep
+from workbench.forces.force_diagnosis import BALANCE_FLOORS, ForceDiagnosis, ForceStep
 from workbench.report import ranking
 from workbench.report.charts import EXTENDED, MEASURED, MODEL, QUIET, Figure, axis, layout, line, profiles
 from workbench.report.comparison_report import WORDS
@@ -99,7 +99,7 @@ def _key_figures(diagnosis: ForceDiagnosis) -> Html:
     floor_n, best = diagnosis.floor_n, diagnosis.best
     typical = (
         Shown("–") if floor_n is None else Shown(times(best.median_error_n, floor_n)),
-        f"of {floor_n:.3g} N; explained: at most {AT_FLOOR:g} ×" if floor_n else "each place is passed once",
+        f"of {floor_n:.3g} N; explained: at most {BALANCE_FLOORS:g} ×" if floor_n else "each place is passed once",
     )
     added = ", ".join(name.replace("_", " ") for name in diagnosis.missing)
     return figures_of_merit(

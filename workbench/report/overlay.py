@@ -25,7 +25,7 @@ SHADES = {
     "near stops": "rgba(90,100,115,0.16)",
 }
 HELD_OUT = "rgba(27,127,121,0.10)"
-FINEST = 4000
+MOST_SHADED_COLUMNS = 4000
 """Columns in which phases are shaded at most."""
 Mask = NDArray[np.bool_]
 
@@ -165,7 +165,7 @@ def _position(
 
 def _grounds(time_s: Column, shades: Sequence[Shade]) -> Iterator[Trace]:
     along_s = running_s(time_s)
-    stride = max(1, time_s.size // FINEST)
+    stride = max(1, time_s.size // MOST_SHADED_COLUMNS)
     for shade in shades:
         x: list[float | None] = []
         y: list[float | None] = []

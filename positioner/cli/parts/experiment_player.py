@@ -24,7 +24,7 @@ PLAY_POLL_S = 0.3
 LATEST_FILES = 2
 """Of the recorder, in which an experiment may lie."""
 HELD_CYCLES = 1.5  # a register holds so long that no cycle misses it
-SAME, LEAST_PLAYED_SHARE = 0.01, 0.95
+SAME_PRESSURE_SHARE, LEAST_PLAYED_SHARE = 0.01, 0.95
 """Of the sequence's pressures, and of its length: farther from them, or for less, a recording is of something else."""
 
 
@@ -197,7 +197,7 @@ def is_of(recording: Recording, points: tuple[tuple[float, float], ...]) -> bool
     span_pa = max(float(np.ptp(levels_pa)), 1.0)
     # Between two samples the command is held: it is where it was to be then, by a cycle and a half at the most.
     held_s = HELD_CYCLES * float(np.median(np.diff(time_s)))
-    allowed_pa = SAME * span_pa + held_s * np.abs(np.gradient(wanted_pa, wanted_s))
+    allowed_pa = SAME_PRESSURE_SHARE * span_pa + held_s * np.abs(np.gradient(wanted_pa, wanted_s))
 
     def share(begin_s: float) -> float:
         apart_pa = np.abs(np.interp(begin_s + wanted_s, time_s, recording.command_pa) - wanted_pa)

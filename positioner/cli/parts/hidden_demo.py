@@ -28,7 +28,7 @@ HIDDEN = {"name": "position_friction", "growth": 0.6, "travel_m": STROKE_M}
 CANDIDATES = ("position_friction", "spring_hardening", "asymmetric_friction", "preload")
 STEPS = (0.65, 0.50, 0.72, 0.45, 0.60, 0.35, 0.55, 0.40, 0.68, 0.52)  # p.u.; the whole travel, both ways
 HIDDEN_PERIOD_S = 5e-3
-STEP_S, HIDDEN_SETTLED_S = 0.8, 0.1
+HIDDEN_STEP_S, HIDDEN_SETTLED_S = 0.8, 0.1
 """Time for each; its error is the mean over the last part of it."""
 IDENTIFIED_WITHIN_S = 120.0
 HIDDEN_POLL_S = 0.01
@@ -121,7 +121,7 @@ def _steps(recordings: str, folder: Path, setup: BusSetup, slave: str, law: str 
         errors = []
         for reference in STEPS:
             dcs.set("reference", reference)
-            _wait(dcs, STEP_S - HIDDEN_SETTLED_S)
+            _wait(dcs, HIDDEN_STEP_S - HIDDEN_SETTLED_S)
             errors.append(fmean(_wait(dcs, HIDDEN_SETTLED_S)) - reference)
         if fault := int(dcs.get("fault")):
             raise CommandFailed(f"the daemon has a fault: {Fault(fault).text}; see {recordings}.log")

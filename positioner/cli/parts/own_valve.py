@@ -13,14 +13,14 @@ if TYPE_CHECKING:
 ANSWERS_WITHIN_S = 0.5
 UNKNOWN_STROKE_M = 10.0
 """Longer than any valve's: with it no reading is implausible for its travel."""
-LONGEST_S = 600.0
+LONGEST_PROGRAM_S = 600.0
 """Of one program, while nobody has said."""
 
 
 def unknown_travel(file: "DaemonFile") -> "DaemonFile":
     """Return the file as it is for a valve of which nothing is known but its device and its pressures."""
     experiment = file.experiment.model_copy(
-        update={"travel_window": (0.0, 1.0), "limit_s": max(file.experiment.limit_s, LONGEST_S)}
+        update={"travel_window": (0.0, 1.0), "limit_s": max(file.experiment.limit_s, LONGEST_PROGRAM_S)}
     )
     valve = file.valve.model_copy(update={"stroke_m": UNKNOWN_STROKE_M, "action": "air_to_open", "breakaway_pa": None})
     return file.model_copy(update={"valve": valve, "law": None, "experiment": experiment})

@@ -7,7 +7,7 @@ from collections.abc import Iterator
 from contextlib import contextmanager, suppress
 from threading import Thread
 
-MOST_BYTES = 4096  # bytes: sixteen of the largest frames
+PIECE_BYTES = 4096  # bytes: sixteen of the largest frames
 
 
 @contextmanager
@@ -41,4 +41,4 @@ def _carry(across: dict[int, int], stop: int) -> None:
             return
         for end in ready:
             with suppress(BlockingIOError):
-                os.write(across[end], os.read(end, MOST_BYTES))
+                os.write(across[end], os.read(end, PIECE_BYTES))
