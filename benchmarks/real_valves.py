@@ -19,14 +19,15 @@ The least excursion of a step by e to r, direction s, is that of two slides by a
     max(m_-s(r), m_s(r) - abs(e))      m_s = (F_s,s - F_c,s)/k_s + (F_s,s + F_c,-s)/k_p - w, or the shortest that counts
 
 each with the friction of its direction and the spring at r; a packing of stiffness k_p gives way before it breaks
-loose, play w is taken up. Whoever goes on in the direction of the last slide before turning round needs less: a ratio
-may be below 1. The first `LEARNING` steps are counted apart. Some 10 s a valve. With `--left-alone-s 3600` each is then
-left for an hour at its last reference, and changes of the command after the first minute are counted: there are none
-without a limit cycle. With `--disturbance 0.01` the I/P meanwhile drifts to and fro by 1 % of the bench range, once in
-`DRIFTS_S`: what moves the stem has to be answered, what does not, not. With `--reference-noise 2e-4` a DCS writes every
-`WRITTEN_S` a reference that is off by that share of the stroke, a standard deviation; what the stem travels in that
-time stands beside the changes. `--steps 0` only identifies, in seconds a valve. `--law conventional` has
-another law. `--periods-ms 1 20` gives every valve each of these in place of its own.
+loose, play w is taken up. What counts is seen for a slide, though it is shown shorter by half a quantum. Whoever goes
+on in the direction of the last slide before turning round needs less: a ratio may be below 1. The first `LEARNING`
+steps are counted apart. Some 10 s a valve. With `--left-alone-s 3600` each is then left for an hour at its last
+reference, and changes of the command after the first minute are counted: there are none without a limit cycle. With
+`--disturbance 0.01` the I/P meanwhile drifts to and fro by 1 % of the bench range, once in `DRIFTS_S`: what moves the
+stem has to be answered, what does not, not. With `--reference-noise 2e-4` a DCS writes every `WRITTEN_S` a reference
+that is off by that share of the stroke, a standard deviation; what the stem travels in that time stands beside the
+changes. `--steps 0` only identifies, in seconds a valve. `--law conventional` has another law. `--periods-ms 1 20`
+gives every valve each of these in place of its own.
 """
 
 import argparse
@@ -312,7 +313,7 @@ def shortest_slide_m(each: Drawn, position_m: float, direction: int) -> float:
     static_n, coulomb_n = (1 + asymmetry) * grown * valve.static_n, (1 + asymmetry) * grown * valve.coulomb_n
     gave_n = static_n + (1 - asymmetry) * grown * valve.coulomb_n
     gave_way_m = gave_n / effect["presliding"]["stiffness_n_per_m"] - effect["backlash"]["width_m"]
-    return float(max((static_n - coulomb_n) / spring + gave_way_m, VISIBLE * each.stroke_m))
+    return float(max((static_n - coulomb_n) / spring + gave_way_m, VISIBLE * each.stroke_m + 0.5 * each.quantum_m))
 
 
 def least_excursion_m(each: Drawn, from_m: float, to_m: float) -> float:

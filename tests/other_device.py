@@ -2,14 +2,14 @@
 
     m x'' = A p - k x - F_0 - F_v x' - F_f - F_stop        F_0 preload, towards closing
     F_f   = s_0 z + s_1 z'                                  LuGre: z is how far the bristles of the contact are bent
-    z'    = x' - s_0 abs(x') z / g(x'),   g(v) = F_c + (F_s - F_c) exp(-(v/v_s)^2)
+    z'    = x' - s_0 abs(x') z / g(x'),   g(v) = (1 + a sign(v)) (F_c + (F_s - F_c) exp(-(v/v_s)^2))
     T p'  = u - p                                           the I/P
 
 Nothing of it is from `sim/`, where friction is Karnopp's: no state is ever "stuck" here. Steps of 0.1 ms, the velocity
 before the position, the bristles exactly over a step of constant velocity.
 
-The device samples on its own clock. Its registers are whole numbers: the position of 12 bits, pressure and command in
-mbar. It has no time stamp, no counter, no status, and refuses function 23.
+The device samples on its own clock. Its registers are whole numbers of 16 bits: the position of 12 bits, pressure and
+command in mbar, or finer (`Registers`). It has no time stamp, no counter, no status, and refuses function 23.
 """
 
 import socket
@@ -30,7 +30,7 @@ from config.modbus_map import ModbusMap, Place
 
 BITS = 4096
 MBAR_PA = 100.0
-SUPPLY_MBAR = 1400
+SUPPLY_PA = 1400 * MBAR_PA
 POSITION, PRESSURE, COMMAND = 40, 41, 60
 UNIT = 3
 SAMPLED_EVERY_S = 0.007
@@ -52,6 +52,8 @@ class Parameters:
     viscous_ns_per_m: float = 1300.0
     coulomb_n: float = 90.0
     static_n: float = 120.0
+    asymmetry: float = 0.0
+    """a: of the friction, more of it upward."""
     stribeck_m_per_s: float = 1e-3
     bristle_n_per_m: float = 2e7
     bristle_damping_ns_per_m: float = 6e3
@@ -61,13 +63,21 @@ class Parameters:
     @property
     def static_law(self) -> tuple[float, float, float]:
         """Slope, Pa/m, and what is to be added to it after a slide up and taken from it after one down, Pa."""
-        both_n = self.spring_n_per_m, self.coulomb_n + self.preload_n, self.coulomb_n - self.preload_n
-        slope, up, down = (each / self.area_m2 for each in both_n)
+        up_n, down_n = ((1.0 + s * self.asymmetry) * self.coulomb_n + s * self.preload_n for s in (1, -1))
+        slope, up, down = (each / self.area_m2 for each in (self.spring_n_per_m, up_n, down_n))
         return slope, up, down
 
     def balance_pa(self, position_m: float) -> float:
         """Return the pressure that balances spring and preload, Pa."""
         return (self.spring_n_per_m * position_m + self.preload_n) / self.area_m2
+
+
+@dataclass(frozen=True, slots=True)
+class Registers:
+    """How fine its whole numbers are: of the position, counts of the stroke; of pressure and command, Pa."""
+
+    counts: int = BITS
+    pressure_pa: float = MBAR_PA
 
 
 class Stem:
@@ -87,6 +97,7 @@ class Stem:
     def _step(self, command_pa: float) -> None:
         q, v, z = self.parameters, self._velocity, self._bent_m
         level_n = q.coulomb_n + (q.static_n - q.coulomb_n) * exp(-((v / q.stribeck_m_per_s) ** 2))
+        level_n *= 1.0 + q.asymmetry * ((v > 0.0) - (v < 0.0))
         bending = v - q.bristle_n_per_m * abs(v) * z / level_n
         friction_n = q.bristle_n_per_m * z + q.bristle_damping_ns_per_m * bending
         beyond_m = min(self.position_m, 0.0) + max(self.position_m - q.stroke_m, 0.0)
@@ -110,14 +121,15 @@ class OtherDevice:
         port: of the server, on this machine.
     """
 
-    def __init__(self, position_m: float, parameters: Parameters) -> None:
+    def __init__(self, position_m: float, parameters: Parameters, registers: Registers) -> None:
         self.stem = Stem(parameters, position_m)
+        self.registers = registers
         self.port = free_port()
         self._server = TcpServer(self.port, "127.0.0.1")
         self._slave = self._server.add_slave(UNIT)
         self._slave.add_block("registers", defines.HOLDING_REGISTERS, 0, 64)
         _know_no_function_23(self._slave)
-        self._show(COMMAND, round(self.stem.pressure_pa / MBAR_PA))
+        self._show(COMMAND, round(self.stem.pressure_pa / registers.pressure_pa))
         self._ended = Event()
         self._thread = Thread(target=self._live, name="other device")
 
@@ -135,17 +147,17 @@ class OtherDevice:
         stop_server(self._server, self.port)
 
     @property
-    def command_mbar(self) -> int:
-        """The command that is in its register."""
+    def command(self) -> int:
+        """What is in the register of its command."""
         (word,) = self._slave.get_values("registers", COMMAND, 1)
         return int(word)
 
     def described(self, reply_timeout_s: float) -> ModbusTcpDevice:
         """Return what the daemon is told of it."""
         registers = ModbusMap(
-            position_m=Place(address=POSITION, type="uint16", scale=self.stem.parameters.stroke_m / BITS),
-            pressure_pa=Place(address=PRESSURE, type="uint16", scale=MBAR_PA),
-            command_pa=Place(address=COMMAND, type="uint16", scale=MBAR_PA),
+            position_m=Place(address=POSITION, type="uint16", scale=self._quantum_m),
+            pressure_pa=Place(address=PRESSURE, type="uint16", scale=self.registers.pressure_pa),
+            command_pa=Place(address=COMMAND, type="uint16", scale=self.registers.pressure_pa),
         )
         return ModbusTcpDevice(port=self.port, unit=UNIT, reply_timeout_s=reply_timeout_s, map=registers)
 
@@ -153,23 +165,30 @@ class OtherDevice:
         lived_s = time.monotonic()
         while not self._ended.wait(SAMPLED_EVERY_S):
             now_s = time.monotonic()
-            command_pa = MBAR_PA * min(self.command_mbar, SUPPLY_MBAR)
+            command_pa = min(self.registers.pressure_pa * self.command, SUPPLY_PA)
             self.stem.advance(command_pa, min(now_s - lived_s, LONGEST_S))
             lived_s = now_s
             self._sample()
 
     def _sample(self) -> None:
-        self._show(POSITION, min(max(round(self.stem.position_m / self.stem.parameters.stroke_m * BITS), 0), BITS - 1))
-        self._show(PRESSURE, round(self.stem.pressure_pa / MBAR_PA))
+        counts = round(self.stem.position_m / self._quantum_m)
+        self._show(POSITION, min(max(counts, 0), self.registers.counts - 1))
+        self._show(PRESSURE, round(self.stem.pressure_pa / self.registers.pressure_pa))
+
+    @property
+    def _quantum_m(self) -> float:
+        return self.stem.parameters.stroke_m / self.registers.counts
 
     def _show(self, address: int, word: int) -> None:
         self._slave.set_values("registers", address, [word])
 
 
 @contextmanager
-def other_device(position_m: float, parameters: Parameters | None = None) -> Iterator[OtherDevice]:
+def other_device(
+    position_m: float, parameters: Parameters | None = None, registers: Registers | None = None
+) -> Iterator[OtherDevice]:
     """Give a device that lives and answers, its stem at rest at a position."""
-    device = OtherDevice(position_m, parameters or Parameters())
+    device = OtherDevice(position_m, parameters or Parameters(), registers or Registers())
     device.start()
     try:
         yield device

@@ -64,11 +64,11 @@ def moved(device: OtherDevice, dcs: Dcs, reference: float, period_s: float) -> M
     """Write a reference, p.u., and wait for the end of the move."""
     began_s = last_s = time.monotonic()
     dcs.set("reference", reference)
-    command, slides = device.command_mbar, 0
+    command, slides = device.command, 0
     path = []
     while (now_s := time.monotonic()) < min(began_s + ENDED_WITHIN_CYCLES * period_s, last_s + ENDED_CYCLES * period_s):
-        if device.command_mbar != command:
-            command, slides, last_s = device.command_mbar, slides + 1, now_s
+        if device.command != command:
+            command, slides, last_s = device.command, slides + 1, now_s
         path.append((now_s - began_s, device.stem.position_m / device.stem.parameters.stroke_m))
         time.sleep(POLL_S)
     _, end = path[-1]

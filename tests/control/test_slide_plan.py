@@ -10,6 +10,7 @@ from positioner.control.laws.slides.slide_balance import Balance
 from positioner.control.laws.slides.slide_memory import Anchor
 from positioner.estimation.acceptance import Ratios
 from positioner.estimation.landings.breakaway_distance import MIDDLE, BreakawayDistance, Interval
+from positioner.estimation.landings.landing_detector import VISIBLE
 from tests.control.scripted_stem import SETTINGS, SLOPE_PA_PER_M, STROKE_M
 
 FRICTION_PA = 20e3
@@ -49,7 +50,8 @@ def test_the_way_back_has_room_for_what_sensor_and_device_round() -> None:
     rough = replace(PLAN, quantum_m=1e-4, bounds=replace(SETTINGS, command_step_pa=400.0))
     assert rough.back_m(-1) == pytest.approx(1.02 * 5.6e-3 + 0.5e-4 + 200.0 / SLOPE_PA_PER_M)
     tiny = replace(rough, distances=BreakawayDistance(*(4 * [Interval(0.9e-4, 1e-4, seen=True)])))
-    assert tiny.back_m(-1) == pytest.approx(5.1e-3 * STROKE_M), "one that only has to be seen is not made longer"
+    seen_m = VISIBLE * STROKE_M + rough.rounded_m
+    assert tiny.back_m(-1) == pytest.approx(seen_m), "one that only has to be seen is seen, however it is rounded"
 
 
 def test_each_bound_bars_an_excursion() -> None:

@@ -18,9 +18,10 @@ The interval shrinks by that. It widens by contradiction: where a way holds thou
 lies within `RAISE` of it, to either side; a way that breaks loose though so long a one has held makes held a little
 shorter than it. And by time, for friction changes: with each slide held fades.
 An interval of which one side is missing has its next of kin's, if that agrees. But once a slide of its own has broken
-loose, what held a kin is tried less a factor, each time less, until one of its own holds. For a play that is taken up
-makes turning shorter than going on, and a packing that gives way longer. It is kept as in the middle of the travel, and
-goes over it as friction over slope does, φ/κ; what turning takes besides as friction.
+loose, what held a kin is believed less a factor; and once a way that held the kin has broken it loose, the next is less
+by that factor, until one of its own holds. For a play that is taken up makes turning shorter than going on, and a
+packing that gives way longer. It is kept as in the middle of the travel, and goes over it as friction over slope does,
+φ/κ; what turning takes besides as friction.
 """
 
 from dataclasses import dataclass, replace
@@ -134,7 +135,8 @@ class Interval:
             return self
         if self.seen:
             broke_m = min(self.broke_m, kin.broke_m) if kin.seen else self.broke_m
-            return Interval(min(kin.held_m, broke_m) / KIN_FACTOR, broke_m, self.seen)
+            held_m = kin.held_m / KIN_FACTOR if kin.held_m < broke_m else broke_m / KIN_FACTOR**2
+            return Interval(held_m, broke_m, self.seen)
         if kin.seen or kin.broke_m < self.broke_m:
             return Interval(self.held_m or kin.held_m, kin.broke_m, kin.seen)
         held_m = kin.held_m / KIN_FACTOR

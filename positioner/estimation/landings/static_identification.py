@@ -11,6 +11,7 @@ measurement of the pressure that is wrong.
 from collections import deque
 from collections.abc import Iterable
 from dataclasses import replace
+from math import inf
 
 from config.codes import Refusal
 from config.extended_valve import ExtendedValve
@@ -108,9 +109,10 @@ class StaticIdentification:
             return None
         if self._valve is not None:
             outcome = self._of_stem(outcome, self._valve)
-        if outcome.landing and self._gave_way(outcome):
+        off_m, near_m = self._off_m(outcome)
+        if outcome.landing and self._gave_way(outcome, off_m, near_m):
             outcome = outcome._replace(moved=False, landing=False)
-        if not outcome.moved:
+        if not outcome.moved and off_m > near_m:
             self.held = (outcome, *self.held[: self._each - 1])
         if outcome.landing:
             self._take(outcome)
@@ -157,20 +159,28 @@ class StaticIdentification:
         self.balances = tuple(balanced(each, self.law.swing) for each in self.landings)
         self._balance = LocalBalance(ratios=self.law.ratios, landings=self.balances, stroke_m=self._stroke_m)
 
-    def _gave_way(self, outcome: SlideOutcome) -> bool:
+    def _off_m(self, outcome: SlideOutcome) -> tuple[float, float]:
+        """Return how far a stem went from where a slide by the law goes, m, and by how much such slides may miss.
+
+        One that went as a slide does was broken loose, be it too short to be seen for one. Without a law none was.
+        """
+        if not self.law.valid:
+            return inf, 0.0
+        went_m = outcome.direction * (outcome.position_m - outcome.from_m)
+        should_m = self._balance.ahead_m(outcome) / (1.0 - self.law.swing)
+        return abs(went_m - should_m), OFF * self._stroke_m + 3.0 * (self._balance.scatter_m + outcome.std_m)
+
+    def _gave_way(self, outcome: SlideOutcome, off_m: float, near_m: float) -> bool:
         """Whether the packing that holds the stem gave way, for a slide by the law would have gone elsewhere.
 
         Not for long ways, nor `IN_A_ROW` times on end but as the packing has given way before: then it is the law that
         no longer holds.
         """
-        law, went_m = self.law, outcome.direction * (outcome.position_m - outcome.from_m)
-        if not law.valid or went_m > LONGEST_WAY * self._stroke_m:
+        went_m = outcome.direction * (outcome.position_m - outcome.from_m)
+        if not self.law.valid or went_m > LONGEST_WAY * self._stroke_m:
             self._elsewhere = 0
             return False
-        should_m = self._balance.ahead_m(outcome)
-        should_m /= 1.0 - law.swing
-        allowed_m = max(LIKE * abs(should_m), OFF * self._stroke_m + 3.0 * (self._balance.scatter_m + outcome.std_m))
-        elsewhere = abs(went_m - should_m) > allowed_m
+        elsewhere = off_m > max(LIKE * went_m, near_m)
         if elsewhere and (gives := compliance(self.held, outcome.direction)) is not None and gives.explains(outcome):
             return True
         self._elsewhere = self._elsewhere + 1 if elsewhere else 0

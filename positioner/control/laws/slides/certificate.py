@@ -40,6 +40,7 @@ from itertools import pairwise
 from math import ceil, inf, log, sqrt
 from statistics import median
 
+from positioner.control.laws.slides.plan import shortest_seen_m
 from positioner.control.laws.slides.slide_bounds import THRESHOLDS, SlideBounds
 from positioner.control.valve_knowledge import ValveKnowledge
 from positioner.estimation.landings.breakaway_distance import FADED, GROWS, RAISE, Interval
@@ -178,7 +179,7 @@ def certified(known: KnownValve, bounds: SlideBounds) -> Certificate | Refused:
         if not (each.seen and each.held_m > 0.0 and each.broke_m <= WIDEST * each.held_m and local**2 < RAISE):
             return Refused(f"break-away {name} is not known well enough", _of_breakaway(each))
     onward, turning = (Reach.of(each, local, amiss_m, thresholds.missed) for each in (known.onward, known.turning))
-    shortest_m = thresholds.shortest * stroke_m
+    shortest_m = shortest_seen_m(bounds) + known.rounded_m
     spare_m = (thresholds.return_margin - 1.0) * turning.likely_m + known.rounded_m
     allowed_m = min(spare_m, thresholds.missed * max(shortest_m, min(onward.likely_m, turning.likely_m)))
     if error_m > allowed_m:

@@ -30,6 +30,7 @@ from positioner.control.laws.slides.slide_balance import Balance
 from positioner.control.laws.slides.slide_bounds import SlideBounds
 from positioner.control.laws.slides.slide_memory import Anchor
 from positioner.estimation.landings.breakaway_distance import BreakawayDistance, Interval, Local
+from positioner.estimation.landings.landing_detector import VISIBLE
 
 
 class Excursion(NamedTuple):
@@ -74,8 +75,8 @@ class Plan:
 
     @property
     def shortest_m(self) -> float:
-        """The shortest slide that is seen for one, m."""
-        return self.bounds.thresholds.shortest * self.bounds.stroke_m
+        """The shortest slide that is sent, m: it is seen for one, however it is rounded."""
+        return shortest_seen_m(self.bounds) + self.rounded_m
 
     def way_m(self, direction: int, *, turning: bool | None = None) -> float:
         """Return how far a slide must be sent, m; by default as it would go from where the stem stands."""
@@ -155,6 +156,11 @@ class Plan:
     def rounded_m(self) -> float:
         """By how much sensor and device round where a slide lands, m."""
         return self.bounds.thresholds.rounded_quanta * self.quantum_m + beside_m(self.bounds, self.balance)
+
+
+def shortest_seen_m(bounds: SlideBounds) -> float:
+    """Return how far a stem must go to be seen to slide, m: else its packing may have given way."""
+    return VISIBLE * bounds.stroke_m
 
 
 def beside_m(bounds: SlideBounds, balance: Balance) -> float:

@@ -27,8 +27,6 @@ class SlideThresholds:
     """Of the stroke: no packing gives way farther."""
     gone_on: float = 2.0
     """Of the way: a stem that went farther crept there, or was pushed."""
-    shortest: float = 5.1e-3
-    """Of the stroke: a slide shorter than 5e-3 would not be told from a packing that gives way (`VISIBLE`)."""
     first_distance: float = 0.1
     """Of F_c/k_s: the first guess of a break-away distance, where neither a slide nor F_s has told one."""
     rounded_quanta: float = 0.5

@@ -13,6 +13,7 @@ grown: then those that held before it say nothing either, for they were sent by 
 from dataclasses import replace
 from typing import TYPE_CHECKING
 
+from positioner.control.laws.slides.plan import shortest_seen_m
 from positioner.control.laws.slides.slide_bounds import SlideBounds
 from positioner.control.laws.slides.slide_memory import Anchor, Move, Row, SlideMemory
 from positioner.control.laws.slides.states import Presliding, Slide, slide_of
@@ -73,7 +74,7 @@ def _after_presliding(memory: SlideMemory, state: Presliding, outcome: SlideOutc
     asked_m, went_m = abs(state.to_m - outcome.from_m), abs(outcome.position_m - outcome.from_m)
     if outcome.direction != loose.direction or went_m <= now.bounds.thresholds.gone_on * asked_m:
         return landed
-    way_m = max(loose.way_m, now.bounds.thresholds.shortest * now.bounds.stroke_m)
+    way_m = max(loose.way_m, shortest_seen_m(now.bounds))
     return _taught(landed, loose, Went(way_m, way_m, moved=True, arrived=True), now)
 
 

@@ -19,7 +19,7 @@ from functools import cached_property
 from typing import NamedTuple
 
 from config.codes import InhibitReason
-from positioner.control.laws.slides.plan import Plan, beside_m
+from positioner.control.laws.slides.plan import Plan, beside_m, shortest_seen_m
 from positioner.control.laws.slides.slide_balance import Balance
 from positioner.control.laws.slides.slide_bounds import SlideBounds
 from positioner.control.laws.slides.slide_memory import Excursions, Move, Row, SlideMemory, day_m
@@ -207,7 +207,7 @@ def _one_slide(memory: SlideMemory, now: Now) -> tuple[Slide, bool]:
     if isinstance(memory.state, Out) and s == -memory.state.slide.direction:
         # Planned by what may do: it is tried before more is asked for.
         likely_m = plan.interval(s, turning=plan.turns(s)).likely_m
-        way_m = min(way_m, max(likely_m, plan.shortest_m - plan.rounded_m))
+        way_m = min(way_m, max(likely_m, shortest_seen_m(now.bounds)))
     to_m = now.reference_m + (0.0 if memory.course is None else plan.lead_m(memory.course, now.seen.now_s, s))
     return _slide_from(memory, from_m, to_m, s), s * (to_m - from_m) >= way_m
 
