@@ -7,7 +7,8 @@ follows, and rests at the other:
     cov = (M'M)^-1 (sum_|l|<L (1 - |l|/L) sum_i e_i e_(i+l) m_i m_(i+l)') (M'M)^-1      rows m_i = (p_i, 1), residuals e
 
 Rows are chosen by the command, which has no noise: chosen by the noisy position, the line would be bent. Residuals of a
-stem that sticks and slips hang together, so neighbours count, L = 1.5 n^(1/3).
+stem that sticks and slips hang together, so neighbours count, L = 1.5 n^(1/3). Where the slopes g of all legs agree
+within three deviations they are one: the spring's. Friction that goes over the travel turns them apart.
 
 At a rate r of the command the line is late by what lags, in proportion to r. Lines at two rates tell the pressure at
 none, by weighted least squares:
@@ -18,7 +19,7 @@ p command, Pa; x position, m; r rate, Pa/s.
 """
 
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from math import hypot, sqrt
 
 import numpy as np
@@ -58,6 +59,15 @@ class Line:
         variance = pressure_pa**2 * pp + 2.0 * pressure_pa * pl + ll
         return pressure_pa, sqrt(max(variance, 0.0)) / abs(self.slope)
 
+    def of_slope(self, slope: float, variance: float) -> "Line":
+        """Return the line of another slope, m/Pa, through the middle of this one, where its level is known best."""
+        (pp, pl), (_, ll) = self.covariance
+        middle_pa = -pl / pp if pp else 0.0
+        level = self.level + (self.slope - slope) * middle_pa
+        both = -middle_pa * variance
+        covariance = (variance, both), (both, ll + middle_pa * (pl - both))
+        return replace(self, slope=slope, level=level, covariance=covariance)
+
     @property
     def held_pa(self) -> float:
         """How far the command goes from sample to sample, Pa: it is known no better between them."""
@@ -75,11 +85,13 @@ class Ramps:
 
     Attributes:
         lines: of each leg with one.
+        slope_pa_per_m: spring rate over the area.
         low_m, high_m: where the stem lies at the ends, undetermined where it was not seen to.
         noise_m: standard deviation of the position about its lines and ends.
     """
 
     lines: tuple[Line, ...]
+    slope_pa_per_m: Figure
     low_m: Figure
     high_m: Figure
     noise_m: float
@@ -106,18 +118,6 @@ class Ramps:
         weights = 1.0 / deviations[slow] ** 2
         mean = float(np.sum(weights * pressures[slow]) / np.sum(weights))
         return Figure(mean, THRESHOLDS.sigmas / sqrt(float(np.sum(weights))))
-
-    def slope_pa_per_m(self) -> Figure:
-        """Return the spring rate over the area, Pa/m: mean of all lines, which lag does not turn."""
-        if not self.lines:
-            return without_value("no ramp has a line")
-        slopes = np.array([1.0 / each.slope for each in self.lines])
-        deviations = np.array([each.slope_std / each.slope**2 for each in self.lines])
-        weights = 1.0 / np.maximum(deviations, 1e-12 * np.abs(slopes)) ** 2
-        mean = float(np.sum(weights * slopes) / np.sum(weights))
-        own = 1.0 / sqrt(float(np.sum(weights)))
-        spread = float(np.sqrt(np.sum(weights * (slopes - mean) ** 2) / np.sum(weights) / max(1, len(slopes) - 1)))
-        return Figure(mean, THRESHOLDS.sigmas * max(own, spread))
 
     @property
     def rates_pa_per_s(self) -> tuple[float, ...]:
@@ -198,12 +198,37 @@ def ramps_of(legs: Sequence[Leg]) -> Ramps:
         highs.append(high)
         scatter.append(line.residual_m)
     digit_m = quantum_m(np.concatenate([leg.position_m for leg in legs])) if legs else 0.0
+    slope_pa_per_m = _slope_pa_per_m(lines)
     return Ramps(
-        tuple(lines),
+        _parallel(lines, slope_pa_per_m),
+        slope_pa_per_m,
         _end(lows, "the lower", digit_m),
         _end(highs, "the upper", digit_m),
         float(np.median(scatter)) if scatter else 0.0,
     )
+
+
+def _slope_pa_per_m(lines: Sequence[Line]) -> Figure:
+    """Return the spring rate over the area, Pa/m: mean of all lines, which lag does not turn."""
+    if not lines:
+        return without_value("no ramp has a line")
+    slopes = np.array([1.0 / each.slope for each in lines])
+    deviations = np.array([each.slope_std / each.slope**2 for each in lines])
+    weights = 1.0 / np.maximum(deviations, 1e-12 * np.abs(slopes)) ** 2
+    mean = float(np.sum(weights * slopes) / np.sum(weights))
+    own = 1.0 / sqrt(float(np.sum(weights)))
+    spread = float(np.sqrt(np.sum(weights * (slopes - mean) ** 2) / np.sum(weights) / max(1, len(slopes) - 1)))
+    return Figure(mean, THRESHOLDS.sigmas * max(own, spread))
+
+
+def _parallel(lines: Sequence[Line], slope_pa_per_m: Figure) -> tuple[Line, ...]:
+    """Return lines of one slope, each through its own middle, where the slopes agree; else as they are."""
+    if not slope_pa_per_m.value:
+        return tuple(lines)
+    slope = 1.0 / slope_pa_per_m.value
+    std = slope**2 * (slope_pa_per_m.plus_minus or 0.0) / THRESHOLDS.sigmas
+    agree = all(abs(each.slope - slope) <= THRESHOLDS.sigmas * each.slope_std for each in lines)
+    return tuple(each.of_slope(slope, std**2) for each in lines) if agree else tuple(lines)
 
 
 def _one_way(command: Column, tolerance: float) -> list[tuple[int, int]]:

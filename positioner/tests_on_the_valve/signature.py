@@ -107,8 +107,8 @@ def signature(recordings: "list[Recording]", plate: Nameplate) -> Outcome:
         Quantity("low_m", "lower end of the travel", "m", low),
         Quantity("high_m", "upper end of the travel", "m", high),
         Quantity("travel_m", "travel", "m", travel),
-        Quantity("spring_pa_per_m", "spring rate over 10 to 90 %", "Pa/m", ramps.slope_pa_per_m()),
-        *_force("spring_n_per_m", "spring rate", "N/m", ramps.slope_pa_per_m(), plate),
+        Quantity("spring_pa_per_m", "spring rate over 10 to 90 %", "Pa/m", ramps.slope_pa_per_m),
+        *_force("spring_n_per_m", "spring rate", "N/m", ramps.slope_pa_per_m, plate),
         *_friction(ramps, plate, x_0, x_1),
         *_bench_set(ramps, plate, x_0, x_1, float(min(np.min(each.command_pa) for each in legs))),
         *_bands(ramps, x_0, x_1),
@@ -156,7 +156,7 @@ def _verdict(
     if travel.value is None:
         return (ValveTestVerdict.UNDETERMINED,), ["the ramps did not take the stem from end to end"]
     _, slow, _ = _half_apart(ramps, half_m)
-    if (ramps.slope_pa_per_m().value or 0.0) * travel.value < THRESHOLDS.springless * 2.0 * (slow.value or 0.0):
+    if (ramps.slope_pa_per_m.value or 0.0) * travel.value < THRESHOLDS.springless * 2.0 * (slow.value or 0.0):
         return (ValveTestVerdict.NO_SPRING,), [f"a broken spring, or {NEEDED['double_acting']}"]
     off_m = abs(travel.value - plate.stroke_m)
     if off_m > max(THRESHOLDS.stroke_wrong * plate.stroke_m, travel.plus_minus or 0.0):
@@ -198,7 +198,7 @@ def _bench_set(ramps: Ramps, plate: Nameplate, x_0: float, x_1: float, least_pa:
     if ups[0].value is None:  # of one rate alone: the mean of both directions has no lag
         ups = [ramps.at_slowest(1, each) for each in (x_0, x_1)]
         downs = [ramps.at_slowest(-1, each) for each in (x_0, x_1)]
-    slope = ramps.slope_pa_per_m().value or 0.0
+    slope = ramps.slope_pa_per_m.value or 0.0
     for told in (ups, downs):  # where the end is, is known no better than it was seen
         told[:] = [_widened(each, slope, end) for each, end in zip(told, (ramps.low_m, ramps.high_m), strict=True)]
     low, high = (_together(up, down) for up, down in zip(ups, downs, strict=True))
@@ -231,7 +231,7 @@ def _together(up: Figure, down: Figure) -> Figure:
 
 def _bands(ramps: Ramps, x_0: float, x_1: float) -> list[Quantity]:
     still, _, _ = _half_apart(ramps, 0.5 * (x_0 + x_1))
-    hysteresis = scaled(still, 2.0 / ((ramps.slope_pa_per_m().value or 1.0) * (x_1 - x_0)))
+    hysteresis = scaled(still, 2.0 / ((ramps.slope_pa_per_m.value or 1.0) * (x_1 - x_0)))
     centres, up, down, error = _averaged(ramps, x_0, x_1)
     few = without_value("too few samples of both directions at one command")
     largest, average, linear = few, few, few

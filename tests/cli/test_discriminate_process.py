@@ -3,7 +3,7 @@
 import argparse
 import time
 from collections.abc import Iterator
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from pathlib import Path
 
 import numpy as np
@@ -111,6 +111,9 @@ def assert_turns(valve: RunningValve) -> None:
     assert 5e-3 <= float(np.max(played.recording.position_m)) - begun_m < 0.02
     assert float(np.max(played.recording.command_pa)) < start_pa + 60e3
     assert valve.command_pa() == pytest.approx(start_pa)
+    refused = valve.play(replace(program, points=((0.0, 1e6), (1.0, 1e6))))
+    assert refused.state is ExperimentState.BEYOND_PRESSURE
+    assert refused.recording is None, "what was played before is none of its rows"
 
 
 def test_a_veto_from_elsewhere_stops_it(site: Site) -> None:

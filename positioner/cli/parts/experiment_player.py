@@ -19,7 +19,8 @@ if TYPE_CHECKING:
     from workbench.discriminate.discrimination import Player
     from workbench.discriminate.experiment_design import DesignedExperiment
 
-RECORDED_WITHIN_S = 30.0
+RECORDED_WITHIN_S, BROKEN_OFF_WITHIN_S = 30.0, 5.0
+"""Until the recorder has written an experiment; one that was broken off, for one that was refused has no rows."""
 PLAY_POLL_S = 0.3
 LATEST_FILES = 2
 """Of the recorder, in which an experiment may lie."""
@@ -106,12 +107,14 @@ class RunningValve:
         from positioner.tests_on_the_valve.program import Played
 
         within_s = 2.0 * self._file.experiment.limit_s + RECORDED_WITHIN_S
+        before = last_excited(self._folder, self._file.valve.name)
         with _dcs(self._arguments) as dcs:
             turn, band = (each / self._file.valve.stroke_m for each in (program.turn_m, program.band_m))
             state = dcs.play(program.points, within_s, turn=turn, band=band)
             problem = "" if state.played else why_not(state, dcs)
         points = program.points if state is ExperimentState.COMPLETE else ()
-        recording = read_experiment_rows(self._folder, self._file.valve.name, points)
+        written_s = RECORDED_WITHIN_S if state.played else BROKEN_OFF_WITHIN_S
+        recording = read_experiment_rows(self._folder, self._file.valve.name, points, before, written_s)
         if recording is None and not problem:
             problem = f"what is recorded in {self._folder} is not the whole of it"
         return Played(recording, state, problem)
@@ -127,11 +130,12 @@ def player_on(file: "DaemonFile", arguments: argparse.Namespace) -> "Player":
     def play(chosen: "DesignedExperiment") -> Played:
         points = chosen.course.points()
         within_s = 2.0 * file.experiment.limit_s + RECORDED_WITHIN_S
+        before = last_excited(folder, file.valve.name)
         with _dcs(arguments) as dcs:
             state = dcs.play(points, within_s)
             if state is not ExperimentState.COMPLETE:
                 return Played(None, why_not(state, dcs))
-        recording = read_experiment_rows(folder, file.valve.name, points)
+        recording = read_experiment_rows(folder, file.valve.name, points, before)
         return Played(recording, "" if recording else f"what is recorded in {folder} is not the whole of it")
 
     return play
@@ -145,17 +149,24 @@ def why_not(state: "ExperimentState", dcs: "Dcs") -> str:
     return state.text if fault is Fault.NONE else f"fault: {fault.text}"
 
 
-def read_experiment_rows(folder: Path, valve: str, points: tuple[tuple[float, float], ...]) -> Recording | None:
+def read_experiment_rows(
+    folder: Path,
+    valve: str,
+    points: tuple[tuple[float, float], ...],
+    before: Recording | None,
+    within_s: float = RECORDED_WITHIN_S,
+) -> Recording | None:
     """Return the rows of the experiment that has just ended, once the recorder has written them; None if it does not.
 
-    Without points it may have ended anywhere, so whatever was played last is it.
+    Without points it may have ended anywhere, so whatever was played since is it; `before` is what was played earlier.
 
     Raises:
         InputError: a recording cannot be read.
     """
-    due_s = time.monotonic() + RECORDED_WITHIN_S
+    due_s = time.monotonic() + within_s
     while time.monotonic() < due_s:
-        if found := last_excited(folder, valve):
+        found = last_excited(folder, valve)
+        if found and (before is None or found.time_s[-1] != before.time_s[-1]):
             return found if not points or is_of(found, points) else None
         time.sleep(PLAY_POLL_S)
     return None

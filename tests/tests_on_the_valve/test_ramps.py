@@ -1,0 +1,40 @@
+"""Lines of slow ramps, drawn by hand: where their slopes agree they are one spring's."""
+
+import numpy as np
+import pytest
+
+from positioner.tests_on_the_valve.ramps import Leg, ramps_of
+
+SLOPE_PA_PER_M, FRICTION_PA, LOW_PA, TRAVEL_M, NOISE_M = 2.6e6, 3e3, 19e3, 0.03, 3e-4
+ROWS = 400
+
+
+def legs(growth: float, seed: int) -> list[Leg]:
+    """Return a way up and one down of a stem whose friction grows over its travel by a share."""
+    rng, found = np.random.default_rng(seed), []
+    for way in (1, -1):
+        command_pa = np.linspace(0.0, 120e3, ROWS)[::way]
+        slope = SLOPE_PA_PER_M + way * growth * FRICTION_PA / TRAVEL_M
+        stem_m = np.clip((command_pa - LOW_PA - way * FRICTION_PA) / slope, 0.0, TRAVEL_M)
+        shown_m = stem_m + NOISE_M * rng.standard_normal(ROWS)
+        found.append(Leg(way, 120e3 / (0.05 * ROWS), 0.05 * np.arange(ROWS), command_pa, shown_m))
+    return found
+
+
+def test_where_slopes_agree_the_end_is_known_by_all_of_them() -> None:
+    """By its own slope a line misses the end by 137 Pa rms here, by the common one by less than 107."""
+    off_pa, told_pa = [], []
+    for seed in range(30):
+        figure = ramps_of(legs(0.0, seed)).at_slowest(-1, 0.0)
+        assert figure.value is not None and figure.plus_minus is not None
+        off_pa.append(figure.value - (LOW_PA - FRICTION_PA))
+        told_pa.append(figure.plus_minus / 3.0)
+    rms_pa = float(np.sqrt(np.mean(np.square(off_pa))))
+    assert rms_pa < 0.02 * (LOW_PA - FRICTION_PA) / 3.0
+    assert rms_pa == pytest.approx(float(np.mean(told_pa)), rel=0.5), "no more is promised"
+
+
+def test_friction_that_grows_over_the_travel_keeps_its_lines_apart() -> None:
+    ramps = ramps_of(legs(1.0, 0))
+    up, down = ramps.lines
+    assert 1.0 / up.slope - 1.0 / down.slope == pytest.approx(2.0 * FRICTION_PA / TRAVEL_M, rel=0.2)
