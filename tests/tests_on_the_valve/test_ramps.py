@@ -26,7 +26,8 @@ def test_where_slopes_agree_the_end_is_known_by_all_of_them() -> None:
     off_pa, told_pa = [], []
     for seed in range(30):
         figure = ramps_of(legs(0.0, seed)).at_slowest(-1, 0.0)
-        assert figure.value is not None and figure.plus_minus is not None
+        assert figure.value is not None
+        assert figure.plus_minus is not None
         off_pa.append(figure.value - (LOW_PA - FRICTION_PA))
         told_pa.append(figure.plus_minus / 3.0)
     rms_pa = float(np.sqrt(np.mean(np.square(off_pa))))
