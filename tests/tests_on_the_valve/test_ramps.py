@@ -17,7 +17,7 @@ def legs(growth: float, seed: int) -> list[Leg]:
         slope = SLOPE_PA_PER_M + way * growth * FRICTION_PA / TRAVEL_M
         stem_m = np.clip((command_pa - LOW_PA - way * FRICTION_PA) / slope, 0.0, TRAVEL_M)
         shown_m = stem_m + NOISE_M * rng.standard_normal(ROWS)
-        found.append(Leg(way, 120e3 / (0.05 * ROWS), 0.05 * np.arange(ROWS), command_pa, shown_m))
+        found.append(Leg(way, 120e3 / (0.05 * ROWS), np.linspace(0.0, 0.05 * ROWS, ROWS), command_pa, shown_m))
     return found
 
 
