@@ -55,11 +55,15 @@ def test_a_valve_is_no_loop(kind: str) -> None:
 
 def test_loops_of_one_file_are_told_apart_by_their_tags_and_have_their_own_stem() -> None:
     named = columns(
-        ("FIC101.PV", "", PV), ("FIC101.OP", "", OP), ("LIC7.PV", "", PV), ("LIC7.OP", "", OP), ("FV101.ZT", "", STEM)
+        ("FIC101.PV", "", PV),
+        ("FIC101.OP", "", OP),
+        ("LIC7/PID1/PV.CV", "", PV),
+        ("LIC7/PID1/OUT.CV", "", OP),
+        ("FV101.ZT", "", STEM),
     )
     assert [(each.tag, each.process_value, each.position) for each in loops_of(named)] == [
         ("FIC101", "FIC101.PV", "FV101.ZT"),
-        ("LIC7", "LIC7.PV", None),
+        ("LIC7 PID1", "LIC7/PID1/PV.CV", None),
     ]
 
 

@@ -129,7 +129,7 @@ def _role(column: LoopColumn) -> str | None:
 def _tag(name: str, role: str) -> str:
     """Return what is left of a name without the words for what it is."""
     words = {"setpoint": SETPOINT, "output": OUTPUT, "process_value": PROCESS_VALUE}[role]
-    left = re.sub(rf"(?:{words})\w*|\bvalue\b|[\[(<].*$", " ", split_words(name), flags=re.IGNORECASE)
+    left = re.sub(rf"(?:{words})\w*|\b(?:value|CV)\b|[\[(<].*$", " ", split_words(name), flags=re.IGNORECASE)
     return " ".join(re.sub(rf"%|/|{PROCESS_UNITS.pattern}", " ", left, flags=re.IGNORECASE).split())
 
 

@@ -81,22 +81,6 @@ def _product(first: Array, second: Array, first_lag: int, second_lag: int) -> fl
 
 
 @compiled
-def _solve(normal: Array, right: Array) -> None:
-    """Solve normal equations, (q, q), in place: their solution is then in the right-hand side, (q,)."""
-    count = right.size
-    for pivot in range(count):
-        for row in range(pivot + 1, count):
-            factor = normal[row, pivot] / normal[pivot, pivot]
-            right[row] -= factor * right[pivot]
-            for column in range(pivot, count):
-                normal[row, column] -= factor * normal[pivot, column]
-    for row in range(count - 1, -1, -1):
-        for column in range(row + 1, count):
-            right[row] -= normal[row, column] * right[column]
-        right[row] /= normal[row, row]
-
-
-@compiled
 def _weigh(shapes: Array, target: Array, weights: Array) -> None:
     """Put into the weights, (q,), those by which shapes, (q, n), make a target, (n,), with the least squares."""
     count = weights.size
@@ -106,7 +90,7 @@ def _weigh(shapes: Array, target: Array, weights: Array) -> None:
         for second in range(count):
             normal[first, second] = _product(shapes[first], shapes[second], 0, 0)
         normal[first, first] += TINY + RIDGE * normal[first, first]
-    _solve(normal, weights)
+    weights[:] = np.linalg.solve(normal, weights)
 
 
 @compiled
@@ -129,7 +113,7 @@ def _colour(values: Array, coefficients: Array) -> None:
         trace += 1e-9 * normal[first, first]
     for each in range(ORDER):
         normal[each, each] += trace
-    _solve(normal, coefficients)
+    coefficients[:] = np.linalg.solve(normal, coefficients)
 
 
 @compiled
@@ -146,22 +130,12 @@ def _whiten(values: Array, coefficients: Array, white: Array) -> None:
 
 
 @compiled
-def _centre(values: Array) -> Array:
-    centred, total = np.empty(values.size), 0.0
-    for row in range(values.size):
-        total += values[row]
-    for row in range(values.size):
-        centred[row] = values[row] - total / values.size
-    return centred
-
-
-@compiled
 def cost_of(shapes: Array, pv: Array) -> tuple[float, Array]:
     """Return the cost of PV, (n,), as a sum of responses, (q, n), and their weights, (q,); of none: a disturbance."""
     count = shapes.shape[0]
-    target, centred, white = _centre(pv), np.empty(shapes.shape), np.zeros(shapes.shape)
+    target, centred, white = pv - pv.mean(), np.empty(shapes.shape), np.zeros(shapes.shape)
     for each in range(count):
-        centred[each] = _centre(shapes[each])
+        centred[each] = shapes[each] - shapes[each].mean()
     weights, coefficients = np.zeros(count), np.zeros(ORDER)
     left, aim = np.zeros(pv.size), np.zeros(pv.size)
     _weigh(centred, target, weights)
@@ -179,7 +153,7 @@ def cost_of(shapes: Array, pv: Array) -> tuple[float, Array]:
 
 @compiled
 def _spread(values: Array) -> float:
-    centred = _centre(values)
+    centred = values - values.mean()
     return np.sqrt(_product(centred, centred, 0, 0))  # type: ignore[no-any-return]
 
 
