@@ -9,6 +9,7 @@ import errno
 import gc
 import io
 import os
+import re
 import select
 import sys
 from collections.abc import Sequence
@@ -116,15 +117,20 @@ def _unread() -> bool:
     return any(event & select.POLLERR for _, event in poll.poll(0))
 
 
+NEGATIVE_NUMBER = re.compile(r"-(\d+\.?\d*|\.\d+)(e[-+]?\d+)?$", re.IGNORECASE)
+
+
 class OneLine(argparse.ArgumentParser):
     """A parser that says what is wrong in one line, as every command does, without its usage before it.
 
-    A number (`type=float`) is a finite one in every command: NaN passes comparisons that are to refuse it.
+    A number (`type=float`) is a finite one in every command: NaN passes comparisons that are to refuse it. A negative
+    one with an exponent is a number, too; argparse takes it for an option (until Python 3.14).
     """
 
     def __init__(self, *what: Any, **named: Any) -> None:
         super().__init__(*what, **named)
         self.register("type", float, _finite)
+        self._negative_number_matcher = NEGATIVE_NUMBER
 
     def error(self, message: str) -> NoReturn:
         """End with it, and with the status of bad input."""

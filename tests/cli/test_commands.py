@@ -209,6 +209,12 @@ def test_doctor_names_a_stroke_in_mm_commands_in_bar_and_a_folder_that_is_a_file
     assert not odd_settings(0.1016, 420e3)
 
 
+@pytest.mark.parametrize("number", ["-1e-9", "-1E3", "-.5e1", "-0.5"])
+def test_a_negative_number_with_an_exponent_is_no_option(number: str, free_port: int, capsys: Capture) -> None:
+    assert main(["set", "reference", number, "--port", str(free_port)]) == 1
+    assert "no daemon answers there" in one_line(capsys)
+
+
 def test_a_slave_that_is_not_there_is_one_line(tmp_path: Path, free_port: int, capsys: Capture) -> None:
     path = tmp_path / "daemon.toml"
     path.write_text(DAEMON.format(port=free_port))
