@@ -1,7 +1,7 @@
 """Every code that a register serves: modes, states, faults, and why something was not done. Texts are said here only.
 
 The numbers go over the wire: never renumber. A member is written `NAME = number, text`; the register table and the
-documents list the texts by `list_codes`, so that none of them says otherwise.
+documents list the texts by `texts`, so that none of them says otherwise.
 """
 
 from enum import IntEnum
@@ -21,7 +21,7 @@ class Code(IntEnum):
         return member
 
 
-def list_codes(codes: type[Code]) -> str:
+def texts(codes: type[Code]) -> str:
     """Return `number text, number text, ...` of all members."""
     return ", ".join(f"{int(each)} {each.text}" for each in codes)
 

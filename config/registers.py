@@ -24,7 +24,7 @@ from config.codes import (
     Sampling,
     ServiceState,
     State,
-    list_codes,
+    texts,
 )
 from config.errors import InputError
 from config.quantities import DeviceStatus, list_bits
@@ -104,7 +104,7 @@ COMMANDS = (
         "reference", 0, "float32", "p.u.", 0.0, 1.0, "opening asked for, or the signal that [travel] makes one of"
     ),
     _operable("reference_scaled", 2, "uint16", "1e-4 p.u.", 0, 10000, "the same as a whole number"),
-    _writable("mode", 3, "uint16", "1", 0, 2, f"{list_codes(Mode)}; falls to hold on a fault"),
+    _writable("mode", 3, "uint16", "1", 0, 2, f"{texts(Mode)}; falls to hold on a fault"),
     _writable("eta_1", 4, "uint16", "1", 0, 1, "0 switches the excitation on (state S3); the DCS ends it: 1"),
     _writable("eta_2", 5, "uint16", "1", 0, 1, "0 switches the parameter identifier on"),
     _writable("eta_3", 6, "uint16", "1", 0, 1, "0 switches the friction estimator on"),
@@ -117,10 +117,10 @@ COMMANDS = (
 )
 
 STATUS = (
-    Register("state", 100, "uint16", "1", list_codes(State)),
-    Register("fault", 101, "uint16", "1", list_codes(Fault)),
-    Register("quality", 102, "uint16", "1", f"of the last measurement: {list_codes(Quality)}"),
-    Register("why", 103, "uint16", "1", f"why not as asked: {list_codes(InhibitReason)}"),
+    Register("state", 100, "uint16", "1", texts(State)),
+    Register("fault", 101, "uint16", "1", texts(Fault)),
+    Register("quality", 102, "uint16", "1", f"of the last measurement: {texts(Quality)}"),
+    Register("why", 103, "uint16", "1", f"why not as asked: {texts(InhibitReason)}"),
     Register("position", 104, "float32", "p.u.", "opening, from the closed end"),
     Register("position_scaled", 106, "int16", "1e-4 p.u.", "the same as a whole number"),
     Register("device_status", 107, "uint16", "1", f"the device's own status word, bits: {list_bits(DeviceStatus)}"),
@@ -131,9 +131,9 @@ STATUS = (
     Register("sample_age", 116, "float32", "s", "time since the last good measurement"),
     Register("reference_in_force", 118, "float32", "p.u.", "what the law follows; outside automatic, the stem"),
     Register("position_deg", 134, "float32", "deg", "the same of a valve that turns; NaN: it has a stem"),
-    Register("restored", 122, "uint16", "1", f"what was known before the daemon was started: {list_codes(Restored)}"),
+    Register("restored", 122, "uint16", "1", f"what was known before the daemon was started: {texts(Restored)}"),
     Register("emergency", 124, "uint16", "1", "CANopen: error code of the device's last EMCY, 0 when it is over"),
-    Register("service", 125, "uint16", "1", f"what the service does: {list_codes(ServiceState)}"),
+    Register("service", 125, "uint16", "1", f"what the service does: {texts(ServiceState)}"),
     Register("locked_out", 126, "uint16", "1", "1: the local switch locks out all writes but the heartbeat"),
     Register(
         "reference_opening", 128, "float32", "p.u.", "opening that the reference asks for: split range, characteristic"
@@ -198,9 +198,7 @@ ESTIMATES = (
     Register("landings", 278, "uint16", "1", "slides that ended in rest, which the static law is taken from"),
     Register("static_residual", 280, "float32", "p.u.", "how far landings lie off the static law, standard deviation"),
     Register("offset_applied", 282, "float32", "Pa", "(up - down) / 2 as the law uses it; 0 in the seed's model"),
-    Register(
-        "sampling", 284, "uint16", "1", f"[device] sampling, as the last excitation found it: {list_codes(Sampling)}"
-    ),
+    Register("sampling", 284, "uint16", "1", f"[device] sampling, as the last excitation found it: {texts(Sampling)}"),
 )
 
 JITTER_BOUNDS_S = {
@@ -277,8 +275,8 @@ HEALTH = (
     _writable(
         "health_reset", 501, "uint16", "1", 0, 1, "write 1: travel, reversals and stiction index start anew; reads 0"
     ),
-    Register("ne107", 502, "uint16", "1", f"NAMUR NE 107: {list_codes(Ne107Status)}"),
-    Register("ne107_cause", 503, "uint16", "1", f"what decides ne107: {list_codes(Ne107Cause)}"),
+    Register("ne107", 502, "uint16", "1", f"NAMUR NE 107: {texts(Ne107Status)}"),
+    Register("ne107_cause", 503, "uint16", "1", f"what decides ne107: {texts(Ne107Cause)}"),
     Register("ne107_causes", 504, "uint16", "1", "causes that hold: bit n - 1 is cause n of ne107_cause, 1 to 16"),
     Register("ne107_causes_high", 505, "uint16", "1", "the same from 17 up: bit n - 17 is cause n"),
     Register("friction", 506, "float32", "Pa", "Coulomb friction F_c / A as the law uses it; NaN: none yet"),
@@ -300,7 +298,7 @@ HEALTH = (
         "the same under commands in the upper fifth of what the travel needs: the supply",
     ),
     Register("end_closed", 532, "float32", "p.u.", "opening where the valve is pressed shut, mean of today"),
-    Register("end_trend", 534, "uint16", "1", f"of that over the last days: {list_codes(EndTrend)}"),
+    Register("end_trend", 534, "uint16", "1", f"of that over the last days: {texts(EndTrend)}"),
     Register("exhausted", 536, "float32", "1", "air let out today, in volumes of the actuator at atmospheric pressure"),
     Register("moves_judged", 520, "uint32", "1", "moves behind the stiction index"),
 )
@@ -325,7 +323,7 @@ EXPERIMENT = (
         "experiment_start", 607, "uint16", "1", 2, MOST_EXPERIMENT_POINTS, "write the number of points: plays them"
     ),
     Register("experiment_points", 608, "uint16", "1", "how many there are"),
-    Register("experiment_state", 609, "uint16", "1", list_codes(ExperimentState)),
+    Register("experiment_state", 609, "uint16", "1", texts(ExperimentState)),
     Register("experiment_elapsed", 610, "float32", "s", "time since its first point, while it is under way"),
     _writable("experiment_turn", 612, "float32", "p.u.", 0.0, 1.0, "travel at which it retraces its way; 0: never"),
     _writable("experiment_band", 614, "float32", "p.u.", 0.0, 1.0, "travel that breaks it off; 0: the window alone"),
@@ -333,8 +331,8 @@ EXPERIMENT = (
 
 EVENTS = (
     Register("event_number", 700, "uint32", "1", "how many events there were: the number of the newest"),
-    Register("event", 702, "uint16", "1", f"the newest: {list_codes(EventKind)}"),
-    Register("event_class", 703, "uint16", "1", f"its class by NAMUR NE 107: {list_codes(Ne107Status)}"),
+    Register("event", 702, "uint16", "1", f"the newest: {texts(EventKind)}"),
+    Register("event_class", 703, "uint16", "1", f"its class by NAMUR NE 107: {texts(Ne107Status)}"),
     Register("event_cause", 704, "uint16", "1", "its cause, a number of the code that goes with it (docs/history.md)"),
     Register("event_time", 706, "uint32", "s", "when it happened, since 1970, UTC"),
     Register("history_lost", 708, "uint32", "1", "entries of the history that were lost since the start"),

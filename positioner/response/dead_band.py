@@ -12,7 +12,7 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 from statistics import median
 
-from positioner.response.figure import Figure, without_value
+from positioner.response.figure import Figure, no_value
 from positioner.response.step_figures import StepFigures
 
 RESPONDED = 0.1
@@ -65,13 +65,11 @@ def follows_step(step: StepFigures, gain: float) -> bool:
 def _figure(bounds: Sequence[InputBounds], wanted: str, unit: str) -> Figure:
     lacks = "this recording does not hold a series of small steps"
     if not bounds:
-        return without_value(f"{lacks}: it lacks {wanted}")
+        return no_value(f"{lacks}: it lacks {wanted}")
     determined = [each for each in bounds if each.low > 0]
     if not determined:
-        return without_value(
-            f"{lacks}: the smallest tried, {min(each.high for each in bounds):.4g} {unit}, moved the stem"
-        )
+        return no_value(f"{lacks}: the smallest tried, {min(each.high for each in bounds):.4g} {unit}, moved the stem")
     low, high = median(each.low for each in determined), median(each.high for each in determined)
     if high - low > COARSE * high:
-        return without_value(f"{lacks}: {low:.4g} {unit} did not move the stem, {high:.4g} {unit} did")
+        return no_value(f"{lacks}: {low:.4g} {unit} did not move the stem, {high:.4g} {unit} did")
     return Figure((low + high) / 2, (high - low) / 2)

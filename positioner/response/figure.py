@@ -32,7 +32,7 @@ class Figure:
     reason: str | None = None
 
 
-def without_value(reason: str) -> Figure:
+def no_value(reason: str) -> Figure:
     """Return a figure without a value, for a reason."""
     return Figure(None, None, reason)
 

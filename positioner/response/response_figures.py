@@ -17,7 +17,7 @@ from config.drive import Scale
 from config.plausibility import odd_sizes
 from config.recording import Column, Recording
 from positioner.response.dead_band import dead_band_and_resolution
-from positioner.response.figure import Figure, without_value
+from positioner.response.figure import Figure, no_value
 from positioner.response.response_result import ResponseFigures
 from positioner.response.step_detection import StepChange, find_steps
 from positioner.response.step_figures import FIGURES, StepFigures, figures_of
@@ -52,7 +52,7 @@ def respond(recording: Recording) -> ResponseFigures:
         if any(steps for _, steps in found):
             return _response(name, found, notes, recording.kind.length)
         notes.append(f"{name} does not step from one held value to another")
-    nothing = without_value("the recording holds no step")
+    nothing = no_value("the recording holds no step")
     return ResponseFigures("none", (), None, nothing, nothing, nothing, tuple(notes))
 
 
@@ -107,8 +107,8 @@ def _response(
         dead_band_and_resolution(steps, gain.value, "m" if is_reference else "Pa")
         if gain.value
         else (
-            without_value("the stem did not respond to any step"),
-            without_value("the stem did not respond to any step"),
+            no_value("the stem did not respond to any step"),
+            no_value("the stem did not respond to any step"),
         )
     )
     return ResponseFigures(name, steps, median(noises) if noises else None, gain, dead_band, resolution, tuple(notes))
@@ -118,7 +118,7 @@ def _static_gain(steps: tuple[StepFigures, ...]) -> Figure:
     """Return position over input between the outermost levels stepped to; of a single level, the step's own."""
     determined = [each for each in steps if each.level_m is not None and each.travel_m.value is not None]
     if not determined:
-        return without_value("no step has enough samples")
+        return no_value("no step has enough samples")
     points = [(each.input_to, each.level_m or 0.0) for each in determined]
     low, high = min(points), max(points)
     if low[0] == high[0]:

@@ -23,7 +23,7 @@ import numpy as np
 
 from config.recording import Column
 from config.results.result import Brief
-from positioner.response.figure import Figure, LevelCrossing, level_crossing, without_value
+from positioner.response.figure import Figure, LevelCrossing, level_crossing, no_value
 from positioner.response.rest_level import RestLevel, rest_at_the_end
 from positioner.response.step_detection import StepChange
 
@@ -82,9 +82,7 @@ def figures_of(
     std_m = hypot(before.level_std_m, after.level_std_m)
     travel_m = after.level_m - before.level_m
     moved = abs(travel_m) > max(OBSERVABLE_SIGMA * std_m, 1.5 * quantum_m)
-    error = (
-        Figure(after.level_m - step.to, after.level_std_m) if is_reference else without_value("the input is a pressure")
-    )
+    error = Figure(after.level_m - step.to, after.level_std_m) if is_reference else no_value("the input is a pressure")
     timed = _measure_times(time_s, position_m, step, before, after) if moved else _all(TIMED, "the stem did not move")
     return StepFigures(
         time_s=start_s,
@@ -105,7 +103,7 @@ def _step_without_figures(start_s: float, step: StepChange, reason: str) -> Step
 
 
 def _all(names: tuple[str, ...], reason: str) -> dict[str, Figure]:
-    return dict.fromkeys(names, without_value(reason))
+    return dict.fromkeys(names, no_value(reason))
 
 
 def _measure_times(
@@ -147,14 +145,12 @@ def _reason_untimed(time_s: Column, step: StepChange, before: RestLevel, after: 
 def _time(crossing: LevelCrossing | None, period_s: float, fewest_within: int) -> Figure:
     """Return when a level was passed, or why that is not known; `fewest_within` samples must lie within that time."""
     if crossing is None:
-        return without_value(f"{TOO_FAR_APART}: the stem was past it at the first")
+        return no_value(f"{TOO_FAR_APART}: the stem was past it at the first")
     early_s, late_s = max(crossing.time_s - crossing.gap_s, 0.0), crossing.time_s + crossing.gap_s
     if crossing.gap_s > GAP_PERIODS * period_s and crossing.plus_minus_s > 0.1 * crossing.time_s:
-        return without_value(
-            f"a gap of {crossing.gap_s:.3g} s in the samples: between {early_s:.3g} and {late_s:.3g} s"
-        )
+        return no_value(f"a gap of {crossing.gap_s:.3g} s in the samples: between {early_s:.3g} and {late_s:.3g} s")
     if crossing.time_s < fewest_within * period_s:
-        return without_value(f"{TOO_FAR_APART}, {period_s:.3g} s: T63 and T86 must take {fewest_within} of them")
+        return no_value(f"{TOO_FAR_APART}, {period_s:.3g} s: T63 and T86 must take {fewest_within} of them")
     return Figure(crossing.time_s, crossing.plus_minus_s)
 
 

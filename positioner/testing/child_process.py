@@ -105,7 +105,7 @@ class ChildProcess:
 
 
 @contextmanager
-def start_module(module: str, *words: str, log: Path) -> Iterator[ChildProcess]:
+def launch(module: str, *words: str, log: Path) -> Iterator[ChildProcess]:
     """Fork a process of ours; make sure that it ends.
 
     Raises:

@@ -8,7 +8,7 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import Any, Self
 
-from positioner.testing.child_process import Agent, ChildProcess, NotDone, port_in, start_module
+from positioner.testing.child_process import Agent, ChildProcess, NotDone, launch, port_in
 
 AGENT, COMMANDS, PROXY = "positioner.testing.agent", "positioner.cli", "positioner.testing.fault_proxy"
 HOST = "127.0.0.1"
@@ -156,7 +156,7 @@ def slave_running(folder: Path, stroke_m: float, lockstep: bool) -> Iterator[Val
     """
     with ExitStack() as stack:
         file, log = str(folder / "slave.toml"), folder / "slave.log"
-        slave = stack.enter_context(start_module(COMMANDS, "sim", file, "--listen-port", "0", log=log))
+        slave = stack.enter_context(launch(COMMANDS, "sim", file, "--listen-port", "0", log=log))
         port = port_in(slave.ready)
         agent = Agent(AGENT, "device", str(port), log=folder / "slave_agent.log")
         stack.callback(agent.end)
@@ -171,9 +171,7 @@ def daemon_running(folder: Path) -> Iterator[PositionerDaemon]:
         NotStarted: it ended instead.
     """
     with ExitStack() as stack:
-        daemon = stack.enter_context(
-            start_module(COMMANDS, "run", str(folder / "daemon.toml"), log=folder / "daemon.log")
-        )
+        daemon = stack.enter_context(launch(COMMANDS, "run", str(folder / "daemon.toml"), log=folder / "daemon.log"))
         port = port_in(daemon.ready)
         agent = Agent(AGENT, "daemon", str(port), log=folder / "daemon_agent.log")
         stack.callback(agent.end)
@@ -183,7 +181,7 @@ def daemon_running(folder: Path) -> Iterator[PositionerDaemon]:
 @contextmanager
 def proxy_running(folder: Path, port: int) -> Iterator[FaultProxy]:
     """Run a wire to a port of this machine."""
-    with start_module(PROXY, str(port), log=folder / "proxy.log") as proxy:
+    with launch(PROXY, str(port), log=folder / "proxy.log") as proxy:
         yield FaultProxy(HOST, port_in(proxy.ready), proxy)
 
 

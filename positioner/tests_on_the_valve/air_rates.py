@@ -10,7 +10,7 @@ from math import sqrt
 import numpy as np
 
 from config.recording import Column, Recording
-from positioner.response.figure import Figure, without_value
+from positioner.response.figure import Figure, no_value
 from positioner.tests_on_the_valve.thresholds import THRESHOLDS
 
 
@@ -18,7 +18,7 @@ def air_rates(recording: Recording, commanded_pa_per_s: float) -> tuple[Figure, 
     """Return how fast the pressure rises and falls, Pa/s; where the command alone limits it, there is no figure."""
     pressure_pa = recording.columns.get("pressure_pa")
     if pressure_pa is None or not np.isfinite(pressure_pa).all() or np.ptp(pressure_pa) == 0.0:
-        nothing = without_value("no pressure is measured")
+        nothing = no_value("no pressure is measured")
         return nothing, nothing
     filling, venting = (_rate(recording.time_s, way * pressure_pa, commanded_pa_per_s) for way in (1.0, -1.0))
     return filling, venting
@@ -32,10 +32,10 @@ def _rate(time_s: Column, rising_pa: Column, commanded_pa_per_s: float) -> Figur
     onward = [each for each in stretches if len(each) and share[each[-1]] > share[each[0]]]
     rows = max(onward, key=len, default=inside[:0])
     if len(rows) < THRESHOLDS.fewest_in_bin:
-        return without_value("too few samples while it changes")
+        return no_value("too few samples while it changes")
     at_s, p = time_s[rows] - time_s[rows[0]], rising_pa[rows]
     slope, level = np.polyfit(at_s, p, 1)
     if slope > THRESHOLDS.as_commanded * commanded_pa_per_s:
-        return without_value(f"as fast as the command, {1e-3 * commanded_pa_per_s:.4g} kPa/s")
+        return no_value(f"as fast as the command, {1e-3 * commanded_pa_per_s:.4g} kPa/s")
     left_pa = float(np.std(p - slope * at_s - level, ddof=2))
     return Figure(float(slope), THRESHOLDS.sigmas * left_pa / (float(np.std(at_s)) * sqrt(len(p))))

@@ -13,7 +13,7 @@ from math import sqrt
 import numpy as np
 
 from config.recording import Recording
-from positioner.response.figure import Figure, without_value
+from positioner.response.figure import Figure, no_value
 from positioner.tests_on_the_valve.thresholds import THRESHOLDS
 from signals.noise import quantum_m
 
@@ -87,7 +87,7 @@ def farthest(recording: Recording, rest: Rest) -> Figure:
     """Return the farthest that the stem went from its rest by the median of a few samples, m."""
     x = recording.position_m
     if len(x) < THRESHOLDS.counted:
-        return without_value("too few samples")
+        return no_value("too few samples")
     windows = np.lib.stride_tricks.sliding_window_view(x, THRESHOLDS.counted)
     gone = np.abs(np.median(windows, axis=1) - rest.position_m)
     return Figure(float(np.max(gone)), 2.0 * 1.25 * rest.noise_m / sqrt(THRESHOLDS.counted))

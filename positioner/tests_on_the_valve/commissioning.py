@@ -25,7 +25,7 @@ from config.codes import ValveTestVerdict
 from config.drive import Kind, as_written
 from config.recording import Column, Recording
 from config.travel import ActionWord
-from positioner.response.figure import Figure, without_value
+from positioner.response.figure import Figure, no_value
 from positioner.tests_on_the_valve import signature, small_steps
 from positioner.tests_on_the_valve.air_rates import air_rates
 from positioner.tests_on_the_valve.outcome import Outcome, Quantity, digits
@@ -243,14 +243,14 @@ def _stroke_times(
     before_up = at_low[at_low < at_high[0]]
     after = at_low[at_low > at_high[-1]]
     if not before_up.size or not after.size:
-        lost = without_value("the command did not stay at its ends")
+        lost = no_value("the command did not stay at its ends")
         return lost, lost
     level = min(THRESHOLDS.arrived, 1.0 - THRESHOLDS.arrived_sigmas * noise_m / (high - low))
 
     def arrival(first: int, last: int, gone: Column) -> Figure:
         there = np.flatnonzero(gone[first:last] >= level)
         if not there.size:
-            return without_value(f"longer than the {float(t[last - 1] - t[first]):.3g} s that were waited")
+            return no_value(f"longer than the {float(t[last - 1] - t[first]):.3g} s that were waited")
         return Figure(float(t[first + int(there[0])] - t[first]), gap_s)
 
     share = (x - low) / (high - low)
@@ -267,7 +267,7 @@ def _leak(recording: Recording, sign: float, digit_m: float) -> Figure:
     rows = max(runs, key=len)
     rows = rows[t[rows] >= t[rows[0]] + THRESHOLDS.settling_s]
     if len(rows) < THRESHOLDS.fewest_at_rest:
-        return without_value("too few samples under the command held")
+        return no_value("too few samples under the command held")
     at_s, x = t[rows] - t[rows[0]], sign * recording.position_m[rows]
     slope, level = np.polyfit(at_s, x, 1)
     left_m = float(np.std(x - slope * at_s - level, ddof=2))
@@ -300,7 +300,7 @@ def _supply(found: Outcome, bounds: Bounds) -> tuple[Figure, list[str]]:
     low, high = (found.figure(each) for each in ("bench_low_pa", "bench_high_pa"))
     friction = found.figure("friction_pa")
     if low.value is None or high.value is None or friction.value is None:
-        return without_value("the bench set is not known"), []
+        return no_value("the bench set is not known"), []
     span_pa = high.value - low.value
     margin = (bounds.maximum_pa - high.value - friction.value) / span_pa
     error = hypot(high.plus_minus or 0.0, friction.plus_minus or 0.0) / span_pa

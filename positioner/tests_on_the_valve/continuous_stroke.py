@@ -15,7 +15,7 @@ from dataclasses import dataclass
 from config.codes import ValveTestVerdict
 from config.drive import VALVE, Kind
 from config.errors import InputError
-from positioner.response.figure import Figure, without_value
+from positioner.response.figure import Figure, no_value
 from positioner.tests_on_the_valve.breakout import Breakout, breakout, rest_before, tolerance_m
 from positioner.tests_on_the_valve.outcome import Curve, Outcome, Picture, Quantity
 from positioner.tests_on_the_valve.program import Bounds, Leap, Played, Program, ramped, require_within
@@ -123,13 +123,13 @@ def _figures(
     up: Breakout | None, down: Breakout | None, moved_m: float, followed_m: float, slope: float | None
 ) -> list[Quantity]:
     told = [
-        without_value("the stem did not break loose") if each is None else Figure(each.command_pa, each.plus_minus_pa)
+        no_value("the stem did not break loose") if each is None else Figure(each.command_pa, each.plus_minus_pa)
         for each in (up, down)
     ]
-    most = least = figure = without_value("the stem did not break loose both ways")
+    most = least = figure = no_value("the stem did not break loose both ways")
     if up is not None and down is not None:
         apart, error = up.command_pa - down.command_pa, up.plus_minus_pa + down.plus_minus_pa
-        most = least = figure = without_value("the spring rate is not known: identify the valve")
+        most = least = figure = no_value("the spring rate is not known: identify the valve")
         if slope is not None:
             q = apart + slope * moved_m
             most = Figure(0.5 * q, 0.5 * error)

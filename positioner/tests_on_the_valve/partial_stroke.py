@@ -24,7 +24,7 @@ import numpy as np
 from config.codes import ExperimentState, ValveTestVerdict
 from config.errors import InputError
 from config.recording import Recording
-from positioner.response.figure import Figure, without_value
+from positioner.response.figure import Figure, no_value
 from positioner.tests_on_the_valve.breakout import (
     Breakout,
     Rest,
@@ -204,7 +204,7 @@ def _figures(
     stroke_m: float,
     state: ExperimentState,
 ) -> list[Quantity]:
-    still = without_value("the stem did not break loose")
+    still = no_value("the stem did not break loose")
     time_s, command_pa = recording.time_s, recording.command_pa
     begins = max(0, rest.rows - 1)
     gap_s = float(np.median(np.diff(time_s)))
@@ -215,7 +215,7 @@ def _figures(
         within = _time_to(recording, rest, found, asked.travel * stroke_m, gap_s, state)
     friction = _friction(recording, rest, travel, state)
     after = rest_after(recording)
-    unrested = without_value("broken off, or too few samples of the rest after it")
+    unrested = no_value("broken off, or too few samples of the rest after it")
     off = unrested
     if after is not None and state.played:
         off = Figure(after.position_m - rest.position_m, hypot(after.error_m, rest.error_m))
@@ -236,25 +236,25 @@ def _time_to(
     recording: Recording, rest: Rest, found: Breakout, travel_m: float, gap_s: float, state: ExperimentState
 ) -> Figure:
     if state is not ExperimentState.TURNED:
-        return without_value("the travel was not reached")
+        return no_value("the travel was not reached")
     gone = found.way * (recording.position_m - rest.position_m)
     reached = np.flatnonzero(gone[found.row :] >= travel_m - rest.noise_m)
     if not reached.size:
-        return without_value("the travel was not reached")
+        return no_value("the travel was not reached")
     return Figure(float(recording.time_s[found.row + int(reached[0])]) - found.time_s, 2.0 * gap_s)
 
 
 def _friction(recording: Recording, rest: Rest, travel: Figure, state: ExperimentState) -> Figure:
     """Return the half distance of the commands on both ways through the inner part of the travel."""
     if state is not ExperimentState.TURNED or travel.value is None:
-        return without_value("the stem was not moved there and back")
+        return no_value("the stem was not moved there and back")
     p, gone = recording.command_pa, np.abs(recording.position_m - rest.position_m)
     turn = int(np.argmax(np.abs(p - p[0])))
     inside = (gone > THRESHOLDS.inner_partial[0] * travel.value) & (gone < THRESHOLDS.inner_partial[1] * travel.value)
     rows = np.arange(len(p))
     ways = [p[inside & (rows <= turn) & (rows >= rest.rows)], p[inside & (rows > turn)]]
     if min(map(len, ways)) < THRESHOLDS.fewest_in_bin:
-        return without_value("too few samples of both ways: a slower ramp has more")
+        return no_value("too few samples of both ways: a slower ramp has more")
     apart = abs(float(np.mean(ways[0]) - np.mean(ways[1])))
     error = sqrt(sum(float(np.var(each, ddof=1)) / len(each) for each in ways))
     return Figure(0.5 * apart, error)
@@ -271,7 +271,7 @@ def _against(now: dict[str, Figure], reference: Outcome, limits: tuple[float, fl
             yield ValveTestVerdict.FRICTION_HIGH
         if low and figure.value + (figure.plus_minus or 0.0) < low * was:
             yield ValveTestVerdict.FRICTION_LOW
-    figure, was = now["stroke_s"], then.get("stroke_s", without_value("")).value
+    figure, was = now["stroke_s"], then.get("stroke_s", no_value("")).value
     if figure.value is not None and was and figure.value - (figure.plus_minus or 0.0) > THRESHOLDS.slow * was:
         yield ValveTestVerdict.SLOW
 

@@ -26,7 +26,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from config.recording import Column, Recording
-from positioner.response.figure import Figure, without_value
+from positioner.response.figure import Figure, no_value
 from positioner.tests_on_the_valve.thresholds import THRESHOLDS
 from signals.noise import quantum_m
 
@@ -100,9 +100,9 @@ class Ramps:
         """Return the command at which the stem passes a position in one direction, without lag, Pa."""
         rates, pressures, deviations = self._at(way, position_m)
         if not rates:
-            return without_value(_no_line(way))
+            return no_value(_no_line(way))
         if max(rates) - min(rates) < THRESHOLDS.same_rate * max(rates):
-            return without_value("ramps of one rate alone: lag would count as friction")
+            return no_value("ramps of one rate alone: lag would count as friction")
         weights = 1.0 / deviations
         matrix = np.column_stack([np.ones(len(rates)), rates]) * weights[:, None]
         solved = np.linalg.lstsq(matrix, pressures * weights)[0]
@@ -113,7 +113,7 @@ class Ramps:
         """Return the same at the slowest rate that was played, lag and all, Pa."""
         rates, pressures, deviations = self._at(way, position_m)
         if not rates:
-            return without_value(_no_line(way))
+            return no_value(_no_line(way))
         slow = [n for n, rate in enumerate(rates) if rate < (1.0 + THRESHOLDS.same_rate) * min(rates)]
         weights = 1.0 / deviations[slow] ** 2
         mean = float(np.sum(weights * pressures[slow]) / np.sum(weights))
@@ -342,7 +342,7 @@ def _at_ends(line: Line, near: tuple[float, float] | None = None) -> tuple[End, 
 def _end(seen: Sequence[End], which: str, digit_m: float) -> Figure:
     told = [(level, scatter, count) for level, scatter, count in seen if level is not None]
     if not told:
-        return without_value(f"the stem was not seen to lie at {which} end of its travel")
+        return no_value(f"the stem was not seen to lie at {which} end of its travel")
     counts = np.array([count for _, _, count in told], dtype=np.float64)
     levels = np.array([level for level, _, _ in told])
     middle = float(np.sum(counts * levels) / np.sum(counts))

@@ -31,7 +31,7 @@ from config.drive import VALVE, Kind
 from config.errors import InputError
 from config.recording import Column, Recording
 from config.results.block import Table
-from positioner.response.figure import Figure, without_value
+from positioner.response.figure import Figure, no_value
 from positioner.tests_on_the_valve.outcome import Curve, Outcome, Picture, Quantity
 from positioner.tests_on_the_valve.program import Bounds, Leap, Program, ramped
 from positioner.tests_on_the_valve.ramps import Leg, Line, Ramps, difference, legs_of, mean, ramps_of, scaled
@@ -202,7 +202,7 @@ def _bench_set(ramps: Ramps, plate: Nameplate, x_0: float, x_1: float, least_pa:
     for told in (ups, downs):  # where the end is, is known no better than it was seen
         told[:] = [_widened(each, slope, end) for each, end in zip(told, (ramps.low_m, ramps.high_m), strict=True)]
     low, high = (_together(up, down) for up, down in zip(ups, downs, strict=True))
-    unseated = without_value("the stem was not seen on its seat")
+    unseated = no_value("the stem was not seen on its seat")
     seat = unseated if ramps.low_m.value is None else difference(downs[0], Figure(least_pa, 0.0))
     return [
         Quantity("bench_low_pa", "bench set, lower end", "Pa", low),
@@ -233,7 +233,7 @@ def _bands(ramps: Ramps, x_0: float, x_1: float) -> list[Quantity]:
     still, _, _ = _half_apart(ramps, 0.5 * (x_0 + x_1))
     hysteresis = scaled(still, 2.0 / ((ramps.slope_pa_per_m.value or 1.0) * (x_1 - x_0)))
     centres, up, down, error = _averaged(ramps, x_0, x_1)
-    few = without_value("too few samples of both directions at one command")
+    few = no_value("too few samples of both directions at one command")
     largest, average, linear = few, few, few
     if len(centres):
         band = (down - up) / (x_1 - x_0)
@@ -317,7 +317,7 @@ def _friction_at(ramps: Ramps, middle_m: float, width_m: float, lag_pa: float) -
                 means.append(float(np.mean(needed)))
                 variances.append(float(np.var(needed, ddof=1)) / int(rows.sum()))
         if not means:
-            return without_value("too few samples there")
+            return no_value("too few samples there")
         told[way] = (float(np.mean(means)), sqrt(sum(variances)) / len(variances))
     value = 0.5 * (told[1][0] - told[-1][0]) - lag_pa
     return Figure(value, THRESHOLDS.sigmas * 0.5 * hypot(told[1][1], told[-1][1]))

@@ -16,7 +16,7 @@ from config.codes import ValveTestVerdict
 from config.errors import InputError
 from config.recording import Column, Recording
 from positioner.response.dead_band import follows_step
-from positioner.response.figure import Figure, without_value
+from positioner.response.figure import Figure, no_value
 from positioner.response.response_figures import respond
 from positioner.tests_on_the_valve.outcome import Curve, Outcome, Picture, Quantity
 from positioner.tests_on_the_valve.program import Bounds, Leap, Program, ramped, require_within
@@ -131,11 +131,11 @@ def _time(name: str, text: str, told: list[Figure]) -> Quantity:
     known = [each for each in told if each.value is not None]
     if not known:
         reason = next((each.reason for each in told if each.reason), "no step moved the stem")
-        return Quantity(name, text, "s", without_value(reason))
+        return Quantity(name, text, "s", no_value(reason))
     middle = median(each.value or 0.0 for each in known)
     return Quantity(name, text, "s", Figure(middle, median(each.plus_minus or 0.0 for each in known)))
 
 
 def _least(told: list[Figure]) -> Figure:
     known = [(abs(each.value), each.plus_minus) for each in told if each.value is not None]
-    return Figure(*min(known)) if known else without_value("no step moved the stem")
+    return Figure(*min(known)) if known else no_value("no step moved the stem")

@@ -4,7 +4,7 @@ import math
 
 import pytest
 
-from config.codes import Code, ExperimentState, Fault, Mode, State, list_codes
+from config.codes import Code, ExperimentState, Fault, Mode, State, texts
 from config.registers import BY_NAME, REGISTERS
 from northbound.observer.permissives import IDENTIFY_READS, identify_permissives
 from northbound.observer.words import (
@@ -36,10 +36,7 @@ def test_every_code_is_said_as_the_table_says_it(register: str) -> None:
 
 def test_every_register_that_lists_codes_is_said_in_words() -> None:
     of = {
-        register.name: code
-        for register in REGISTERS
-        for code in Code.__subclasses__()
-        if list_codes(code) in register.text
+        register.name: code for register in REGISTERS for code in Code.__subclasses__() if texts(code) in register.text
     }
     assert len(of) >= 9
     assert of.items() <= CODES.items()

@@ -33,7 +33,7 @@ GAP_PERIOD_QUANTILES = 10.0
 """A gap is longer than this many times the 95 % quantile of the periods: unevenly logged data have none by that."""
 UNEVEN = 0.05
 """Sampling is uneven if its periods spread by more than this part of their median."""
-SEGMENT_ROWS = 4
+FEW_ROWS = 4
 """Samples of a segment worth simulating."""
 LIKELY_SPIKE = 8.0
 """Times the least scatter that a spike stands off at least."""
@@ -141,9 +141,7 @@ def ready(recording: Recording) -> Record:
     valid = _valid(position_m, quantum, notes)
     segments = tuple(_segments(columns, notes))
     if not segments:
-        raise InputError(
-            "recording", f"no stretch of at least {SEGMENT_ROWS} samples without a gap or a step of the clock"
-        )
+        raise InputError("recording", f"no stretch of at least {FEW_ROWS} samples without a gap or a step of the clock")
     time_s = columns["time_s"]
     seen_m = np.where(valid, position_m, np.nan)
     longest = slice(*max(segments, key=lambda each: each[1] - each[0]))
@@ -208,7 +206,7 @@ def _from_rest(record: Record, notes: list[str]) -> Iterator[tuple[int, int]]:
             # What creeps within the noise looks like rest: the later, the less is left of it.
             latest = rest + _count_unchanged(record, first + rest, end) - AT_ONCE
             rest = latest if rest < latest <= LATEST_REST * (end - first) else rest
-        if rest is None or rest > LATEST_REST * (end - first) or end - first - rest < SEGMENT_ROWS:
+        if rest is None or rest > LATEST_REST * (end - first) or end - first - rest < FEW_ROWS:
             yield first, end
             continue
         if rest:
@@ -440,7 +438,7 @@ def _segments(columns: Mapping[str, Column], notes: list[str]) -> Iterator[tuple
         notes.append(f"before sample {row + 1} {breaks[row]}: simulated anew from there")
     edges = [0, *sorted(breaks.keys() | chosen.keys()), time_s.size]
     for first, end in pairwise(edges):
-        if end - first >= SEGMENT_ROWS:
+        if end - first >= FEW_ROWS:
             yield first, end
         else:
             notes.append(f"samples {first + 1} to {end} stand alone: not simulated")

@@ -57,7 +57,7 @@ class Group:
     table: int = 0
 
 
-def join_clocks(path: Path, groups: Sequence[Group]) -> tuple[Column, dict[str, Column], dict[str, str]]:
+def align(path: Path, groups: Sequence[Group]) -> tuple[Column, dict[str, Column], dict[str, str]]:
     """Return the time of the stem's samples, s, from its clock's zero, the columns at it, and what was done.
 
     Raises:

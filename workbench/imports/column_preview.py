@@ -81,7 +81,7 @@ def show_cell(cell: Cell) -> str:
     return text if len(text) <= WIDEST_CELL else text[: WIDEST_CELL - 2] + ".."
 
 
-def find_decimal(columns: Sequence[ColumnPreview], separator: str) -> tuple[str, str]:
+def find_sign(columns: Sequence[ColumnPreview], separator: str) -> tuple[str, str]:
     """Return the decimal sign that some columns show, and what a person must say where they leave it open."""
     texts = [with_any_unit(cell)[0] for each in columns if each.numbers for cell in each.cells if isinstance(cell, str)]
     try:
@@ -90,7 +90,7 @@ def find_decimal(columns: Sequence[ColumnPreview], separator: str) -> tuple[str,
         return ".", error.problem
 
 
-def likely_header(path: Path, tables: Sequence[RawTable]) -> Header:
+def read_header(path: Path, tables: Sequence[RawTable]) -> Header:
     """Return the likeliest reading of a file; one that is turned before those that are not.
 
     Raises:

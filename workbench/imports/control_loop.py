@@ -30,7 +30,7 @@ CONTROLLER = re.compile(r"\b[FLPTAQWDS][DFIQRY]*C[A-Z]*[ -]?\d", re.IGNORECASE)
 """Tags of controllers by ISA-5.1: measured quantity, functions, C."""
 OF_VALVE = re.compile(r"\b[FLPTHX]C?V[ -]?\d", re.IGNORECASE)
 """Tags of valves."""
-LEAST_OUTPUT, MOST_OUTPUT = -10.0, 110.0
+LEAST_OUT, MOST_OUT = -10.0, 110.0
 """An output in %, and with it one in mA or of 1."""
 OUTPUT_IS_SETPOINT = 1e-3
 """Of the set point's span: an output that never differs by more is the same signal."""
@@ -159,7 +159,7 @@ def _is_share(output: LoopColumn) -> bool:
     known = output.values[np.isfinite(output.values)]
     if not known.size:
         return False
-    return output.unit in ("", *SHARES) and bool(((known >= LEAST_OUTPUT) & (known <= MOST_OUTPUT)).all())
+    return output.unit in ("", *SHARES) and bool(((known >= LEAST_OUT) & (known <= MOST_OUT)).all())
 
 
 def _is_one_signal(setpoint: Array, output: Array) -> bool:

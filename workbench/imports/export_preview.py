@@ -10,8 +10,8 @@ from workbench.imports.column_preview import (
     ColumnPreview,
     columns_of,
     columns_of_all,
-    find_decimal,
-    likely_header,
+    find_sign,
+    read_header,
     show_cell,
 )
 from workbench.imports.control_loop import LoopColumn, LoopColumns, loops_of
@@ -70,7 +70,7 @@ def preview(path: Path, sheet: str | None = None) -> ExportPreview:
         InputError: it cannot be read or holds no table.
     """
     tables = raw_tables(path, sheet)
-    header = likely_header(path, tables)
+    header = read_header(path, tables)
     columns = columns_of(header)
     besides = _besides(header.table, tables)
     words, open_ = proposal(columns, header.table.separator)
@@ -79,7 +79,7 @@ def preview(path: Path, sheet: str | None = None) -> ExportPreview:
         wider = proposal(of_all, header.table.separator)
         if _reads(wider[0]):
             columns, (words, open_), besides = of_all, wider, []
-    decimal, is_open = find_decimal(columns, header.table.separator)
+    decimal, is_open = find_sign(columns, header.table.separator)
     signals = [each for each in columns if each.numbers and not is_clock(each)]
     told = (loops_of([_of_loop(each, sign) for each in signals]) for sign in (",." if is_open else decimal))
     loops = tuple(next(filter(None, told), ()))

@@ -16,7 +16,7 @@ import numpy as np
 from config.errors import InputError
 from config.recording import REQUIRED, Column, Recording
 from workbench.imports.clock_groups import find_groups
-from workbench.imports.clock_join import Group, join_clocks
+from workbench.imports.clock_join import Group, align
 from workbench.imports.column_clock import Clock, clock_of
 from workbench.imports.column_mapping import RANGE_PA, ExportOptions, Source
 from workbench.imports.export_units import SHARES, UNITS
@@ -77,9 +77,7 @@ def read_export(
         groups.append(_group(path, part, of_it, units, decimal, scale, options, tell, metadata))
     said = ", ".join(f"{each.name} from {each.theirs} in {units.get(each.name, 's')}" for each in sources)
     metadata = {"imported": said} | _list_assumptions(units, range_pa) | metadata
-    (time_s, columns, notes) = (
-        (groups[0].time_s, groups[0].columns, {}) if len(groups) == 1 else join_clocks(path, groups)
-    )
+    (time_s, columns, notes) = (groups[0].time_s, groups[0].columns, {}) if len(groups) == 1 else align(path, groups)
     named = {"time_s": time_s} | columns
     return Recording.of({name: named[name] for name in sorted(named, key=_contract_order)}, metadata | notes)
 

@@ -16,13 +16,7 @@ from config.errors import InputError
 from workbench.imports.cell_kinds import may_be_clock, numbers_of, with_any_unit
 from workbench.imports.clock_groups import find_groups
 from workbench.imports.column_clock import clock_of
-from workbench.imports.control_loop import (
-    LEAST_OUTPUT,
-    MOST_OUTPUT,
-    LoopColumns,
-    loop_by_names,
-    stem_by_name,
-)
+from workbench.imports.control_loop import LEAST_OUT, MOST_OUT, LoopColumns, loop_by_names, stem_by_name
 from workbench.imports.export_preview import ExportPreview, preview
 from workbench.imports.export_units import UNITS
 from workbench.imports.file_kind import raw_tables
@@ -104,7 +98,7 @@ def read_loop(
     low, high = op_range
     op_pct = 100.0 * (columns["op"] - low) / (high - low)
     known = op_pct[np.isfinite(op_pct)]
-    if known.size and (known.min() < LEAST_OUTPUT or known.max() > MOST_OUTPUT):
+    if known.size and (known.min() < LEAST_OUT or known.max() > MOST_OUT):
         raise InputError(
             str(path),
             f"output {roles['op']!r} goes from {known.min():g} to {known.max():g}: no share in %; say what it has at "

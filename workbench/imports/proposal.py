@@ -20,7 +20,7 @@ from workbench.imports.cell_kinds import begins_number, may_be_clock, numbers_of
 from workbench.imports.column_clock import time_base
 from workbench.imports.column_mapping import RANGE_PA
 from workbench.imports.column_names import COMMON, COUNTER, SETPOINT, STATUS, is_called, rank_by_name
-from workbench.imports.column_preview import GOOD, ColumnPreview, find_decimal
+from workbench.imports.column_preview import GOOD, ColumnPreview, find_sign
 from workbench.imports.export_units import SHARES, UNITS, ending_of, list_allowed_units, unit_named
 from workbench.imports.raw_table import Cell
 from workbench.imports.time_stamps import propose_formats, seconds_of
@@ -40,7 +40,7 @@ def proposal(columns: Sequence[ColumnPreview], separator: str) -> tuple[tuple[st
     words: list[str] = []
     open_: list[str] = []
     left = list(columns)
-    decimal, sign_open = find_decimal(columns, separator)
+    decimal, sign_open = find_sign(columns, separator)
     of_drive = _of_drive(columns)
     for ours in ("time_s", *of_drive) if of_drive else COMMON:
         chosen = of_drive.get(ours) or (_clock(left) if ours == "time_s" else _likeliest(ours, left))

@@ -19,7 +19,7 @@ from workbench.page.effect_panel import effect_section
 from workbench.page.explained import ADDING_CELL, EFFECT_CELL, about_effect, word
 from workbench.page.search import Search
 from workbench.report.charts import EXTENDED, MEASURED, axis, layout, mark_line
-from workbench.report.diagnosis_report import rank_step
+from workbench.report.diagnosis_report import ranks
 from workbench.report.effects_table import headline
 from workbench.report.ranking import log_ticks
 
@@ -278,7 +278,7 @@ class SearchPanel:
                 "bic": "–" if each.evidence is None else f"{each.evidence:.1f}",
                 "outcome": each.said,
             }
-            for each in sorted(rank_step(step), key=lambda each: each.order)
+            for each in sorted(ranks(step), key=lambda each: each.order)
         ]
         table = ui.table(rows=rows, columns=columns, row_key="effect", pagination=10)
         table.props('dense flat bordered wrap-cells data-testid="candidates"').classes("w-full candidates")

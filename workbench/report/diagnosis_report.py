@@ -246,13 +246,11 @@ def _where(validation: _Validation) -> Html:
 
 
 def _ranking(diagnosis: Diagnosis, validation: _Validation) -> Html:
-    steps = [
-        RankedStep(each.before.effects, each.before.errors.test_rmse_m, rank_step(each)) for each in diagnosis.steps
-    ]
+    steps = [RankedStep(step.before.effects, step.before.errors.test_rmse_m, ranks(step)) for step in diagnosis.steps]
     return show_tried(steps, validation.floor_m, Reading(diagnosis.kind).errors)
 
 
-def rank_step(step: EffectStep) -> list[RankedEffect]:
+def ranks(step: EffectStep) -> list[RankedEffect]:
     """Return what came of each effect of a step."""
     added, rivals = step.added.name if step.added else "", [each.name for each in step.indistinguishable]
     return [

@@ -102,16 +102,6 @@ def with_backlash(file: ValveFile, width_m: float) -> ValveFile:
     return ValveFile(valve=changed, effect=(play, *file.effect))
 
 
-def bare_imitation(file: ValveFile) -> ValveParameters | None:
-    """Return the bare valve that answers as one with play does while it only reverses; None without one."""
-    width_m = next((each.parameters["width_m"] for each in file.effect if each.name == BACKLASH), 0.0)
-    valve = file.valve
-    shift_n = 0.5 * valve.spring_n_per_m * width_m
-    if not 0.0 < 2.0 * shift_n <= valve.static_n - valve.coulomb_n:
-        return None
-    return valve.model_copy(update={"coulomb_n": valve.coulomb_n + shift_n, "static_n": valve.static_n - shift_n})
-
-
 def _apart_m(part: Part, one: ValveFile, other: ValveFile) -> float:
     """Return the rms distance of two valves' answers, once every play is taken up; infinite in a record too short."""
     record = part.record
