@@ -211,7 +211,7 @@ def ramps_of(legs: Sequence[Leg]) -> Ramps:
 def _slope_pa_per_m(lines: Sequence[Line]) -> Figure:
     """Return the spring rate over the area, Pa/m: mean of all lines, which lag does not turn."""
     if not lines:
-        return without_value("no ramp has a line")
+        return no_value("no ramp has a line")
     slopes = np.array([1.0 / each.slope for each in lines])
     deviations = np.array([each.slope_std / each.slope**2 for each in lines])
     weights = 1.0 / np.maximum(deviations, 1e-12 * np.abs(slopes)) ** 2
