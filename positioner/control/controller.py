@@ -128,13 +128,11 @@ class Controller:
 
     def step(self, sample: Sample, requests: Requests) -> Decision:
         """Decide on one sample."""
-        memory, refiner = self._memory, self._refiner
-        if refiner is None:
-            self._memory, decision = step(memory, sample, requests, self._settings)
-            return decision
-        refinement = Refinement.of(refiner) if memory.identifying else NOTHING_FOUND
+        memory, refiner, refinement = self._memory, self._refiner, None
+        if refiner is not None:
+            refinement = Refinement.of(refiner) if memory.identifying else NOTHING_FOUND
         self._memory, decision = step(memory, sample, requests, self._settings, refinement)
-        if self._memory.identifying and (job := memory.identification.taken_job()) is not None:
+        if refiner is not None and self._memory.identifying and (job := memory.identification.taken_job()) is not None:
             refiner.submit(job)
         return decision
 
@@ -578,15 +576,18 @@ commanded_of = by_name(Commanded)
 
 def _commanded(now: Now, asked_pa: float, *, lead: bool) -> Commanded | None:
     """Return the command for a pressure that is asked for, Pa; None where it would not be a finite number."""
-    settings = now.settings
+    settings, path = now.settings, now.memory.path
     limited_pa = clamped(asked_pa, settings.minimum_pa, settings.maximum_pa)
     if not isfinite(limited_pa):
         return None
-    wanted_pa = settings.delivered_pa(limited_pa)
-    if now.memory.path is None:
-        return commanded_of(wanted_pa=wanted_pa, command_pa=wanted_pa, path=None) if isfinite(wanted_pa) else None
-    path = _path(now, wanted_pa, lead=lead)
-    command_pa = wanted_pa if path is None else path.command_pa
+    wanted_pa = command_pa = settings.delivered_pa(limited_pa)
+    if path is not None and settings.valve is not None:
+        limits_pa = (settings.minimum_pa, settings.maximum_pa)
+        path = pressure_path.after_step(path, now.sample.now_s, wanted_pa, settings.valve.inverse, limits_pa, lead=lead)
+        if not isfinite(path.command_pa):
+            return None
+        command_pa = settings.delivered_pa(path.command_pa)
+        path = path._replace(command_pa=command_pa)
     return commanded_of(wanted_pa=wanted_pa, command_pa=command_pa, path=path) if isfinite(command_pa) else None
 
 
@@ -597,19 +598,6 @@ def _held_instead(now: Now) -> Commanded:
     safe_pa = settings.delivered_pa(settings.safe_pa(action, memory.wanted_pa))
     path = None if memory.path is None else long_held(safe_pa, now.sample.now_s)
     return commanded_of(wanted_pa=safe_pa, command_pa=safe_pa, path=path)
-
-
-def _path(now: Now, wanted_pa: float, *, lead: bool) -> PathMemory | None:
-    """Return what is remembered of the pressure on its way, and with it the command."""
-    memory, settings = now.memory.path, now.settings
-    if memory is None or settings.valve is None:
-        return None
-    limits_pa = (settings.minimum_pa, settings.maximum_pa)
-    inverse = settings.valve.inverse
-    path = pressure_path.after_step(memory, now.sample.now_s, wanted_pa, inverse, limits_pa, lead=lead)
-    if not isfinite(path.command_pa):
-        return path
-    return path._replace(command_pa=settings.delivered_pa(path.command_pa))
 
 
 def _nothing_known(now: Now, applied: Applied) -> tuple[Applied, Law]:

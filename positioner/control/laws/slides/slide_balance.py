@@ -11,9 +11,7 @@ from collections.abc import Sequence
 from dataclasses import dataclass, replace
 from functools import cached_property
 
-from config.extended_valve import ExtendedValve
 from positioner.control.laws.slides.slide_bounds import THRESHOLDS
-from positioner.estimation.acceptance import Ratios
 from positioner.estimation.landings.breakaway_distance import BreakawayDistance, Interval, Local
 from positioner.estimation.landings.landing_detector import VISIBLE, SlideOutcome
 from positioner.estimation.landings.local_balance import LocalBalance
@@ -27,16 +25,6 @@ class Balance(LocalBalance):
     held: tuple[SlideOutcome, ...]
     swing: float = 0.0
     """ρ, share of its way by which the stem swings past its balance (estimation/landings/swing.py)."""
-
-    def is_made_of(
-        self,
-        ratios: Ratios,
-        landings: tuple[SlideOutcome, ...],
-        held: tuple[SlideOutcome, ...],
-        valve: ExtendedValve | None,
-    ) -> bool:
-        """Whether it is made of these very things: each is replaced whole when something is learnt."""
-        return self.ratios is ratios and self.landings is landings and self.held is held and self.valve is valve
 
     def slide_pa(self, from_m: float, to_m: float, direction: int) -> float:
         """Return the pressure under which a slide from rest ends at a place, Pa: at its balance, or swung past it."""

@@ -8,6 +8,7 @@ do not take back (`reference_course.py`).
 """
 
 from dataclasses import dataclass, replace
+from operator import is_
 from typing import ClassVar, Self
 
 from config.codes import InhibitReason
@@ -148,9 +149,11 @@ def balance_after(before: Balance | None, ratios: Ratios, seen: Seen, stroke_m: 
     """Return what the law knows of the valve: what it knew in the step before, where nothing has been learnt since."""
     statics, valve = seen.statics, seen.statics.valve
     drifts = valve is not None and valve.inverse.drift_per_s != 0.0
-    known = (ratios, statics.balances, statics.held, valve)
-    if before is not None and not drifts and before.is_made_of(*known):
-        return before
+    known = (ratios, statics.balances, statics.held, valve)  # each is replaced whole when something is learnt
+    if before is not None and not drifts:
+        before_known = (before.ratios, before.landings, before.held, before.valve)
+        if all(map(is_, known, before_known)):
+            return before
     return Balance(
         ratios=ratios,
         landings=statics.balances,
