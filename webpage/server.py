@@ -80,15 +80,12 @@ def _bind(where: Listening) -> socket.socket:
     ports = [PORT, 0] if where.port is None else [where.port]
     for port in ports:
         try:
-            return socket.create_server((where.host, port), family=_family(where.host))
+            family = socket.AF_INET6 if ":" in where.host else socket.AF_INET
+            return socket.create_server((where.host, port), family=family)
         except OSError as error:
             if port == ports[-1]:
                 raise InputError(f"{where.host}:{port}", f"cannot be listened on: {error.strerror}") from None
     raise AssertionError
-
-
-def _family(host: str) -> socket.AddressFamily:
-    return socket.AF_INET6 if ":" in host else socket.AF_INET
 
 
 def _spell_host(host: str) -> str:

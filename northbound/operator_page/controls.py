@@ -176,7 +176,7 @@ class Controls:
         self._parts += [(self._pressure, ("manual_pressure", "mode")), (button, ("manual_pressure", "mode"))]
 
     def _acknowledge_row(self) -> None:
-        button = ui.button("Acknowledge the fault", on_click=lambda: self.do(self._acknowledge))
+        button = ui.button("Acknowledge the fault", on_click=lambda: self.do(self._valve.commands.acknowledge))
         self._parts.append((button.props('no-caps outline dense data-testid="acknowledge"'), ("acknowledge",)))
 
     def _identify_rows(self) -> None:
@@ -262,9 +262,6 @@ class Controls:
         writer = reference_writer(place.history, place.name)
         response = moves.response if moves else None
         return Ahead(self._valve.picture(), view.stroke_m, self._units, place.settings, writer, response)
-
-    def _acknowledge(self, role: Role) -> Confirmation:
-        return self._valve.commands.acknowledge(role)
 
     def _begin_identification(self, role: Role) -> Confirmation:
         def show(progress: float) -> None:

@@ -74,7 +74,7 @@ class Fleet(Result):
         """Say how many valves deserve a look, which, and which recordings could not be read."""
         head = ("rank", "valve", "what", "since", "off by, % of stroke", "sure", "")
         rows = [
-            (str(rank), each.name, each.kind, _since(each), f"{100 * each.cost_share:.2f}", each.sure, _say(each))
+            (str(rank), each.name, each.kind, since_day(each), f"{100 * each.cost_share:.2f}", each.sure, _say(each))
             for rank, each in enumerate(self.complaining, start=1)
         ]
         unknown = f", of {len(self.unknown)} nothing is known" if self.unknown else ""
@@ -226,7 +226,8 @@ def _valve_path(written: str, folder: Path) -> Path:
     return folder / written if written.endswith(".toml") else find_valve(written)
 
 
-def _since(course: ValveCourse) -> str:
+def since_day(course: ValveCourse) -> str:
+    """Return the day since which a valve complains; empty where it does not."""
     return f"{course.since:%Y-%m-%d}" if course.since else ""
 
 

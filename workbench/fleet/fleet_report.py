@@ -10,8 +10,7 @@ from os.path import relpath
 from pathlib import Path
 
 from workbench.fleet.examination import Examination
-from workbench.fleet.fleet import Fleet
-from workbench.fleet.manifest import Entry
+from workbench.fleet.fleet import Fleet, since_day
 from workbench.fleet.valve_course import ValveCourse
 from workbench.report.page import (
     Html,
@@ -52,7 +51,8 @@ def report_fleet(fleet: Fleet, path: Path, manifest: str, reports: Mapping[str, 
         _drill_down(rank, course, links.get(course.name)) for rank, course in enumerate(fleet.complaining, start=1)
     ]
     if fleet.bad:
-        bad = table("bad", ("valve", "recording", "why"), [Row(_bad(*each)) for each in fleet.bad], words=(0, 1, 2))
+        rows = [Row((name, entry.recording, reason)) for name, entry, reason in fleet.bad]
+        bad = table("bad", ("valve", "recording", "why"), rows, words=(0, 1, 2))
         parts.append(section("unreadable", "Recordings that could not be examined", bad))
     nothing_known = {course.name for course in fleet.unknown}
     well = [each.name for each in fleet.courses if not each.gravest and each.name not in nothing_known]
@@ -62,14 +62,10 @@ def report_fleet(fleet: Fleet, path: Path, manifest: str, reports: Mapping[str, 
     write_without_plots(path, f"Fleet of {manifest}", parts)
 
 
-def _bad(name: str, entry: Entry, reason: str) -> tuple[str, str, str]:
-    return name, entry.recording, reason
-
-
 def _ranking(fleet: Fleet) -> Html:
     rows = [
         Row(
-            (str(rank), course.name, course.kind, _since(course), _share(course), course.sure, ""),
+            (str(rank), course.name, course.kind, since_day(course), _share(course), course.sure, ""),
             kind="over",
             picture=link_to(f"#history-{rank}", sparkline(course)),
         )
@@ -131,10 +127,6 @@ def _height(found: Examination) -> float:
 
 def _outcome(found: Examination) -> str:
     return found.outcome.replace("_", " ") + (f": {', '.join(found.effects)}" if found.effects else "")
-
-
-def _since(course: ValveCourse) -> str:
-    return f"{course.since:%Y-%m-%d}" if course.since else ""
 
 
 def _share(course: ValveCourse) -> Shown:

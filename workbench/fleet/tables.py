@@ -193,10 +193,6 @@ def _recordings(courses: Sequence[ValveCourse]) -> Rows:
     ]
 
 
-def _models(courses: Sequence[ValveCourse]) -> Rows:
-    return [_model(course, each) for course in courses for each in course.models]
-
-
 def _model(course: ValveCourse, model: Model) -> Mapping[str, Any]:
     return {
         "valve": course.name,
@@ -227,7 +223,7 @@ def _figures(found: Examination) -> dict[str, Any]:
 ROWS: Mapping[str, Callable[[Sequence[ValveCourse]], Rows]] = {
     "valves": _valves,
     "recordings": _recordings,
-    "models": _models,
+    "models": lambda courses: [_model(course, each) for course in courses for each in course.models],
 }
 
 

@@ -52,7 +52,7 @@ class ColumnsPanel:
             with ui.column().classes("side"):
                 self._columns = {ours: self._column(ours) for ours in OURS}
                 unit = desk.units.length_unit()
-                stroke_m = self._stroke_m()
+                stroke_m = desk.valve.file.valve.stroke_m if desk.valve else None
                 value = None if stroke_m is None else round(unit.per_si * stroke_m, 6)
                 self._stroke = NumberField(f"stroke, {unit.name}, if position is in %", value, name="--stroke-m")
                 self._time_format = ui.input("how dates are written", value=export.proposed.time_format)
@@ -96,9 +96,6 @@ class ColumnsPanel:
             return None
         low, high = (end / per_si for end in ends if end is not None)
         return low, high
-
-    def _stroke_m(self) -> float | None:
-        return self._desk.valve.file.valve.stroke_m if self._desk.valve else None
 
     def _choice(self) -> ColumnChoice:
         said = {

@@ -52,7 +52,8 @@ class SearchPanel:
             self._cancel = ui.button("Cancel", icon="close", on_click=self._stop).props(
                 "outline no-caps color=negative"
             )
-            self._budget = NumberField("at most, s", _show_budget(desk.budget_s), name="at most, s")
+            shown_s = None if desk.budget_s == inf else desk.budget_s
+            self._budget = NumberField("at most, s", shown_s, name="at most, s")
             self._budget.props('dense clearable data-testid="budget"').style("width: 110px")
             self._budget.on("blur", self._handle_text).tooltip("after so long it says what is known then")
             names = ui.select(self._list_effects(), label="effects tried (all)", multiple=True, clearable=True)
@@ -301,7 +302,3 @@ def _label_floor(floor: float) -> Figure:
     """Return what stands over the line of the floor, on an axis that is logarithmic."""
     where = {"x": log10(floor), "y": 1.0, "yref": "paper", "yanchor": "bottom"}
     return {"text": "floor", "showarrow": False, **where}
-
-
-def _show_budget(budget_s: float) -> float | None:
-    return None if budget_s == inf else budget_s

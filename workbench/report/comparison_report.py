@@ -73,7 +73,7 @@ def report_comparison(comparison: Comparison, path: Path, subject: Subject, grow
         f"{comparison.own.noun} {name}: model against measurement",
         [
             heading(f"{comparison.own.noun} “{name}”: model against measurement", subject, facts(comparison)),
-            _verdict(comparison),
+            verdict(*headline(comparison), bullets(comparison.sentences)),
             _key_figures(comparison, stroke_m),
             _overlay(comparison),
             *([] if comparison.by_setpoint else [_signature(comparison)]),
@@ -107,10 +107,6 @@ def headline(each: Comparison) -> tuple[str, str]:
     if each.floor_m is None or not each.over_direction.count.sum():
         return "open", "This recording cannot judge the model."
     return "bad", "The model does not hold. Where it fails:"
-
-
-def _verdict(each: Comparison) -> Html:
-    return verdict(*headline(each), bullets(each.sentences))
 
 
 def _key_figures(each: Comparison, stroke_m: float) -> Html:
