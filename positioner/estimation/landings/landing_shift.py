@@ -19,12 +19,10 @@ import numpy as np
 from positioner.estimation.array import Array
 from positioner.estimation.landings.landing_detector import SlideOutcome
 from positioner.estimation.landings.parting import best_parting
-from positioner.estimation.landings.static_law import DEVIATIONS, columns, t_of_three_deviations
+from positioner.estimation.landings.static_law import DEVIATIONS, LEAST_SHIFT, columns, t_of_three_deviations
 
 SURE = 2.0
 """Times three deviations, for the instant is sought, and a law that is bent looks like a small shift."""
-LEAST_SHIFT = 2e-3
-"""Of the stroke: a smaller shift counts as none."""
 FEWEST_BEND_LANDINGS = 10
 """Landings: fewer say nothing of a bend."""
 

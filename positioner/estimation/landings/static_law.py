@@ -54,7 +54,7 @@ DEVIATIONS = 3.0
 MIDDLE = (0.3, 0.4, 0.5, 0.6, 0.7)
 """Of the stroke: where it is asked how far the landings are bent."""
 LEAST_SHIFT = 2e-3
-"""Of the stroke: two laws nearer to each other than this agree."""
+"""Of the stroke: two laws nearer to each other than this agree, and a shift of the landings counts as none."""
 
 
 @dataclass(frozen=True, slots=True)

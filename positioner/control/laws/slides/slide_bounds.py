@@ -3,6 +3,7 @@
 from dataclasses import dataclass
 
 from positioner.control.pressure_clamp import clamped
+from positioner.estimation.landings.static_identification import LONGEST_WAY
 
 DAY_S = 86400.0
 
@@ -23,7 +24,7 @@ class SlideThresholds:
     """Of the way: slides that were sent so nearly as far show the same of break-away."""
     far_short: float = 0.25
     """Of the way: no balance is so far off, so that a slide which falls so short has only begun to break loose."""
-    longest_giving: float = 0.03
+    longest_giving: float = LONGEST_WAY
     """Of the stroke: no packing gives way farther."""
     gone_on: float = 2.0
     """Of the way: a stem that went farther crept there, or was pushed."""

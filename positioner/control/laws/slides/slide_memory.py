@@ -68,8 +68,6 @@ class Row:
 
     before: BreakawayDistance
     held: int = 0
-    surely: int = 0
-    """Those as long as has been seen to break it loose; the others, as a guess says."""
     stuck_at_m: float | None = None
     """Where the stem was found stuck. It is until a slide breaks it loose, or it is seen elsewhere."""
 
@@ -116,20 +114,15 @@ class SlideMemory:
     """None: not known, for something else has moved the stem."""
     excursions: Excursions | None = None
 
-    def inhibit_reason(self, bounds: SlideBounds) -> InhibitReason:
-        """Return why the stem is not where it shall be.
-
-        Of one that nothing has broken loose no other reason matters. As long as no bound bars a longer slide, slides
-        that only a guess says to be long enough tell nothing.
-        """
+    @property
+    def inhibit_reason(self) -> InhibitReason:
+        """Why the stem is not where it shall be; of one that nothing has broken loose no other reason matters."""
         state, row = self.state, self.row
         if isinstance(state, Stuck):
             return InhibitReason.STUCK
         reason = InhibitReason.NOTHING if isinstance(state, Watching) else state.reason
-        if row is None or (isinstance(state, Idle) and reason is InhibitReason.NOTHING):
-            return reason
-        surely = row.surely >= bounds.thresholds.stuck_after and reason is not InhibitReason.NOTHING
-        return InhibitReason.STUCK if row.stuck or surely else reason
+        there = isinstance(state, Idle) and reason is InhibitReason.NOTHING
+        return InhibitReason.STUCK if row is not None and row.stuck and not there else reason
 
     @property
     def learnt(self) -> BreakawayDistance | None:

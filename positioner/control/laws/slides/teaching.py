@@ -107,7 +107,7 @@ def held(memory: SlideMemory, slide: Slide, now: "Now") -> SlideMemory:
     turning, local = slide.turning is not False, now.local
     before = memory.learnt.at(slide.direction, turning=turning, local=local)
     if way_m >= before.broke_m:
-        row = replace(row, held=row.held + 1, surely=row.surely + before.seen)
+        row = replace(row, held=row.held + 1)
     move = replace(memory.move, held=True, landed=memory.move.landed - 1)
     memory = replace(memory, row=row, move=move)
     return _taught(memory, slide, Went(way_m, 0.0, moved=False, arrived=False), now)
