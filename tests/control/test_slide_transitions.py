@@ -68,13 +68,13 @@ def test_a_stem_that_nothing_breaks_loose_is_stuck_and_one_that_comes_free_goes_
         away_m = stands_m + (0.15 if stands_m < 0.5 * STROKE_M else -0.15) * STROKE_M
         assert stem.moved_to(away_m) <= stem.settings.thresholds.most_slides
         assert isinstance(stem.memory.state, Stuck)
-        assert stem.memory.inhibit_reason is InhibitReason.STUCK
+        assert stem.memory.inhibit_reason() is InhibitReason.STUCK
         assert stem.memory.distances == before, "what they seem to teach is not believed"
-        found[stem.memory.inhibit_reason.name] += 1
+        found[stem.memory.inhibit_reason().name] += 1
         stem.come_free()
         stem.moved_to(away_m)
         assert abs(stem.position_m - away_m) < 2e-3 * STROKE_M
-        assert stem.memory.inhibit_reason is InhibitReason.NOTHING
+        assert stem.memory.inhibit_reason() is InhibitReason.NOTHING
     assert found["STUCK"] == COUNT
 
 
@@ -192,7 +192,7 @@ def test_what_is_spent_of_a_day_comes_back_with_time() -> None:
     for number in range(6):
         at_m += 0.002 * STROKE_M * (-1) ** number
         stem.moved_to(at_m)
-        reasons.append(stem.memory.inhibit_reason)
+        reasons.append(stem.memory.inhibit_reason())
     assert reasons[0] is InhibitReason.NOTHING
     assert InhibitReason.EXCURSION_BUDGET_SPENT in reasons
     stem.moved_to(0.35 * STROKE_M if at_m > 0.5 * STROKE_M else 0.65 * STROKE_M)

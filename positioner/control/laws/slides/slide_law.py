@@ -73,7 +73,7 @@ class SlideLaw:
     @property
     def inhibit_reason(self) -> InhibitReason:
         """Why the stem is not where it shall be."""
-        return self.memory.inhibit_reason
+        return self.memory.inhibit_reason()
 
     def observe(self, seen: Seen) -> "SlideLaw":
         """Return the law after one sample."""

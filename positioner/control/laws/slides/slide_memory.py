@@ -114,9 +114,8 @@ class SlideMemory:
     """None: not known, for something else has moved the stem."""
     excursions: Excursions | None = None
 
-    @property
     def inhibit_reason(self) -> InhibitReason:
-        """Why the stem is not where it shall be; of one that nothing has broken loose no other reason matters."""
+        """Return why the stem is off its reference; of one that nothing has broken loose no other reason matters."""
         state, row = self.state, self.row
         if isinstance(state, Stuck):
             return InhibitReason.STUCK
