@@ -36,8 +36,8 @@ def test_a_mass_that_hides_what_the_recording_shows_is_named() -> None:
     found = diagnosis.kept_mass
     assert found is not None
     assert not diagnosis.nothing_off
-    assert diagnosis.sentence.endswith(f" But {found.sentence}.")
+    assert found.sentence.lower() in diagnosis.sentence.lower()
     assert abs(found.fitted_kg - LIGHT_KG) < 0.3 * LIGHT_KG
     assert found.fitted_rmse_m < 0.5 * found.kept_rmse_m
-    assert found.sentence.startswith("The mass is kept at 8 kg; were it 1.")
+    assert found.kept_kg == 8.0
     assert diagnose(recording, valve, effects=("backlash",)).kept_mass is None

@@ -40,15 +40,15 @@ OF_DELAYS = (0.5, 0.25, 0.75)
 def guessed_values(added: Sequence[Parameter], record: Record) -> list[tuple[float, ...]]:
     """Return values of the parameters that the positions suggest, for an effect that declares what of them it may be.
 
-    Just inside their lowest or highest, or both; the quanta to which they look rounded; the delays after which the stem
-    moves. Empty if none is declared.
+    Just inside their highest or lowest, then both; the quanta to which they look rounded; the delays after which the
+    stem moves. Empty if none is declared.
     """
     suggested: list[dict[str, float]] = []
     ends = _ends(added, record)
     if ends is not None:
         for inside in (inside * record.scale_m for inside in INSIDE):
             lower_m, upper_m = ends.lowest_m + inside, ends.highest_m - inside
-            stops = ((lower_m, upper_m), (lower_m, ends.above_m), (ends.below_m, upper_m))
+            stops = ((ends.below_m, upper_m), (lower_m, ends.above_m), (lower_m, upper_m))
             suggested += [{"lowest": lower, "swept": upper - lower} for lower, upper in stops]
     if any(each.guess == "quantum" for each in added):
         suggested += [{"quantum": each} for each in likely_quanta_m(record)]

@@ -22,6 +22,8 @@ OTHER_DAMPING = 2.0
 """Factor between two dampings that are not one: a data sheet is not off by more."""
 LESS_DAMPING = (0.7, 0.5, 0.35, 0.25)
 """The same of damping, where a stem may swing past its balance."""
+SAME_NATS = 1e-3
+"""Within which the record tells no strength from another: the first is taken, a stop that nothing comes to is none."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -87,7 +89,11 @@ def _likeliest(like: Likelihood, thetas: Iterable[Vector], onsets_s: Vector) -> 
     """Return the coordinates of the likeliest of parameter vectors, each with its own static friction."""
     found = [_at_its_static(like, theta, onsets_s) for theta in thetas]
     costs = [like.cost(groups.whole) for _, groups in found]
-    return like.coordinates(found[int(np.argmin(costs))][0])
+    return like.coordinates(found[_first_of_least(costs)][0])
+
+
+def _first_of_least(costs: Sequence[float]) -> int:
+    return int(np.argmax(np.array(costs) <= min(costs) + SAME_NATS))
 
 
 def _at_its_static(like: Likelihood, theta: Vector, onsets_s: Vector) -> tuple[Vector, Groups]:
@@ -123,16 +129,15 @@ def starts_by_landings(
 def _best_by_landings(
     like: Likelihood, added: Sequence[Parameter], origins: Sequence[Origin], points: Sequence[tuple[float, ...]]
 ) -> Vector:
-    best, least = like.coordinates(origins[0].theta), np.inf
+    thetas, costs = [], []
     for origin in origins:
         onsets_s = like.run.first_onsets_s() if origin.onsets_s is None else origin.onsets_s
         for theta in _strewn(like, added, origin, points):
             found = like.at(theta, onsets_s)
             landed = found.landings * like.landing_m / (SEARCH.begin * like.sigma_m)
-            cost = like.cost(np.concatenate([landed, found.break_aways]))
-            if cost < least:
-                best, least = like.coordinates(theta), cost
-    return best
+            thetas.append(theta)
+            costs.append(like.cost(np.concatenate([landed, found.break_aways])))
+    return like.coordinates(thetas[_first_of_least(costs)] if thetas else origins[0].theta)
 
 
 def strewn_starts(
