@@ -90,11 +90,11 @@ def _run(u, dt_s, every, k_s, F_v, F_c, F_s, e):  # type: ignore[no-untyped-def]
     t = 0.0
     # it begins in balance: where the first command puts it
     F0 = e[PRELOAD]
-    x = (AREA_M2 * min(p, e[SUPPLY]) + F0) / k_s
+    x = (AREA_M2 * min(p, e[SUPPLY]) - F0) / k_s
     x = min(max(x, 0.0), STROKE_M)
     for _ in range(200):
         area = AREA_M2 * (1.0 - e[AREA] * x / STROKE_M)
-        f = area * min(p, e[SUPPLY]) - k_s * x - e[HARDENING] * x**3 + F0 + e[FLOW] * (x / STROKE_M) ** 2
+        f = area * min(p, e[SUPPLY]) - k_s * x - e[HARDENING] * x**3 - F0 + e[FLOW] * (x / STROKE_M) ** 2
         x += 0.5 * f / k_s
     x = min(x, e[STOP])
     y = x
@@ -118,7 +118,7 @@ def _run(u, dt_s, every, k_s, F_v, F_c, F_s, e):  # type: ignore[no-untyped-def]
             else:
                 p = held
             area = AREA_M2 * (1.0 - e[AREA] * x / STROKE_M)
-            F = area * p - k_s * x - e[HARDENING] * x**3 + F0 + e[FLOW] * (x / STROKE_M) ** 2
+            F = area * p - k_s * x - e[HARDENING] * x**3 - F0 + e[FLOW] * (x / STROKE_M) ** 2
             if x > e[STOP]:
                 F -= 1e8 * (x - e[STOP]) + 1e4 * max(v, 0.0)
             s = 1.0 if (v > 0.0 or (v == 0.0 and F > 0.0)) else -1.0
@@ -162,7 +162,7 @@ def _strength(name: str, e: Array, valve: dict[str, float], rng: np.random.Gener
         "dead_time": (DEAD, "dead_time_s", rng.uniform(0.05, 0.3)),
         "rate_limit": (RATE, "opening_pa_per_s", rng.uniform(15e3, 50e3)),
         "supply_limit": (SUPPLY, "supply_pa", rng.uniform(70e3, 85e3)),
-        "preload": (PRELOAD, "force_n", sign * rng.uniform(0.05, 0.35) * F_c),
+        "preload": (PRELOAD, "force_n", -sign * rng.uniform(0.05, 0.35) * F_c),
         "spring_hardening": (HARDENING, "hardening_n_per_m3", rng.uniform(0.03, 0.5) * k_s / STROKE_M**2),
         "area_variation": (AREA, "share", rng.uniform(0.03, 0.12)),
         "flow_force": (FLOW, "force_n", sign * rng.uniform(0.08, 0.4) * F_c),

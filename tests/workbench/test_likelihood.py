@@ -13,6 +13,7 @@ from tests.workbench.valves import NOISE_M, SEED, record_of, with_effect
 from workbench.data.record import Record, ready
 from workbench.fit.fitting import fit
 from workbench.fit.likelihood import Likelihood, soft, soft_weight
+from workbench.fit.minimiser import WHOLE, Ground, Place, minimise
 from workbench.fit.onsets import with_onsets
 from workbench.fit.problem import problem
 from workbench.model.free_run import FreeRun
@@ -139,3 +140,18 @@ def test_a_slow_ramp_each_way_tells_spring_and_friction() -> None:
     found = fit(record, ValveFile(valve=off)).parameters
     for name in ("spring_n_per_m", "coulomb_n"):
         assert found[name].value == pytest.approx(getattr(SEED.valve, name), rel=2e-3)
+
+
+@pytest.mark.parametrize("seed", range(4))
+def test_a_search_goes_on_over_edges_finer_than_its_steps(seed: int) -> None:
+    """Teeth of a thousandth on a bowl: slopes over a tenth of one know nothing of the bowl."""
+    phase = np.random.default_rng(seed).uniform(0.0, 1.0, 40)
+
+    def rows(at: Place) -> np.ndarray:
+        bowl = [10.0 * at.z[0], 3.0 * at.z[1], 5.0 * (at.z[0] - at.z[1])]
+        return np.concatenate([bowl, 0.3 * ((1e3 * (at.z[0] + 0.7 * at.z[1]) + phase) % 1.0)])
+
+    none, begin = np.empty(0), np.array([1.0, -0.7])
+    ground = Ground(rows, np.zeros(43, dtype=np.int64), Place(begin - 5.0, none), Place(begin + 5.0, none), 5.0)
+    end = minimise(ground, Place(begin, none), WHOLE)
+    assert ground.cost(rows(end)) < 0.5 * ground.cost(rows(Place(begin, none)))

@@ -11,7 +11,8 @@ A residual hangs on the onset of one move alone. H is [A, C; C', D] with D diago
 
 J is taken by forward differences, one simulation a parameter and one for all onsets, and kept up by what each step
 shows (Broyden), move by move:  J <- J + (dr - J dv) dv' / |dv|^2, v = (z, o), lengths by the curvature. It is taken
-anew where a step falls short of what it promised, and before an end is believed.
+anew where a step falls short of what it promised, and before an end is believed; over a wider step where a search stays
+on an edge: a stem that just sticks there, and just does not beside it, has a slope that is one side's.
 
 `begin_by_landings` lets the landings lead first, with the data sheet as a weak prior: where slides end hangs on forces
 alone, so that a start far off finds its valley there.
@@ -46,6 +47,8 @@ class Search:
 
     step: float = 1e-4
     """Of a coordinate, for its derivatives: a simulation is smooth to a hundredth of that."""
+    wide_step: float = 3e-3
+    """The same where a search stays on an edge, whose slope over so little is that of one side."""
     begin: float = 3.0
     """Weight of landings at the beginning, in their deviations: wide, lest one of them decides the valley."""
 
@@ -128,11 +131,11 @@ class Ground:
         """Return of each residual its move's value, (rows,); 0 of none."""
         return np.asarray(np.append(values, 0.0)[self.of])
 
-    def slopes(self, at: Place, r: Vector) -> Slopes:
+    def slopes(self, at: Place, r: Vector, step: float = SEARCH.step) -> Slopes:
         """Return the derivatives of residuals r, by forward differences, backward at an upper end."""
         by_z = np.empty((r.size, at.z.size))
         for i in range(at.z.size):
-            step = SEARCH.step if at.z[i] + SEARCH.step <= self.high.z[i] else -SEARCH.step
+            step = abs(step) if at.z[i] + abs(step) <= self.high.z[i] else -abs(step)
             there = at.z.copy()
             there[i] += step
             by_z[:, i] = (self.rows(Place(there, at.o)) - r) / step
@@ -162,7 +165,7 @@ def minimise(ground: Ground, begin: Place, effort: Effort) -> Place:
         if promised <= 0.5 * enough * cost * (1.0 if free else DAMPING.free):
             if fresh:
                 break
-            slopes, fresh = ground.slopes(here, r), True
+            slopes, fresh = ground.slopes(here, r, _width(damping)), True
             continue
         there = Place(here.z + step.z, here.o + step.o)
         r_there = ground.rows(there)
@@ -175,8 +178,8 @@ def minimise(ground: Ground, begin: Place, effort: Effort) -> Place:
         kept, small = gained > DAMPING.poor * promised, gained < enough * cost
         if gained <= 0.0:
             damping *= DAMPING.failed
-            if not fresh:
-                slopes, fresh = ground.slopes(here, r), True
+            if not fresh or damping / DAMPING.failed <= DAMPING.free < damping:
+                slopes, fresh = ground.slopes(here, r, _width(damping)), True
             continue
         slopes = _seen(ground, slopes, r_there - linear, step, lengths)
         here, r, cost = there, r_there, cost - gained
@@ -186,8 +189,13 @@ def minimise(ground: Ground, begin: Place, effort: Effort) -> Place:
         damping = max(damping * (DAMPING.down if good else 1.0 if kept else DAMPING.up), DAMPING.least)
         idle, fresh = small, small or not kept
         if fresh:
-            slopes = ground.slopes(here, r)
+            slopes = ground.slopes(here, r, _width(damping))
     return here
+
+
+def _width(damping: float) -> float:
+    """Return the step of a coordinate for its derivatives: wide where no step over narrow slopes led lower."""
+    return SEARCH.wide_step if damping > DAMPING.free else SEARCH.step
 
 
 def _with_onsets_that_help(ground: Ground, there: Place, r: Vector, before: Vector) -> tuple[Place, Vector]:

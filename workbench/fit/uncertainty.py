@@ -132,8 +132,8 @@ def _static_interval(like: Likelihood, end: End, i: int) -> tuple[float, float]:
         static_n.append(theta[STATIC])
     costs = soft(like.rows_of_static(path, np.array(static_n)), like.weights.soft).sum(axis=1)
     scatter = max(1.0, 2.0 * min(costs) / max(like.broken.size - 1, 1))
-    near = at[costs <= min(costs) + RISE_95 * scatter]
-    return float(near.min()), float(near.max())
+    near = np.flatnonzero(costs <= min(costs) + RISE_95 * scatter)
+    return float(at[max(near[0] - 1, 0)]), float(at[min(near[-1] + 1, at.size - 1)])  # where it is dearer already
 
 
 def _open_combinations(like: Likelihood, H: Vector, scale: Vector) -> tuple[Combination, ...]:
