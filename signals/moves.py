@@ -288,7 +288,7 @@ def _filled(position_m: Array) -> Array:
 
 
 def _fitted(x: Array, noise_m: float, runs: list[Run]) -> list[Move]:
-    """Move each end of a run to where the rest beside it ends; one sample that lies off it does not end it."""
+    """Move each end of a run to where the rest beside it ends; one sample that lies off does not end the rest after."""
     bounds = [0, *[row for run in runs for row in run], x.size - 1]
     rests = [(bounds[i], bounds[i + 1]) for i in range(0, len(bounds), 2)]
     within = AT_REST * noise_m
@@ -298,12 +298,12 @@ def _fitted(x: Array, noise_m: float, runs: list[Run]) -> list[Move]:
         row, last = first, end
         while row > begins and abs(x[row] - before) > within:
             row -= 1
-        while row + 1 < end and np.min(np.abs(x[row + 1 : min(row + 3, end)] - before)) <= within:
+        while row + 1 < end and abs(x[row + 1] - before) <= within:
             row += 1
         while last < ends and abs(x[last] - after) > within:
             last += 1
         while last - 1 > row and np.min(np.abs(x[max(last - 2, row + 1) : last] - after)) <= within:
             last -= 1
-        if _covers(x, noise_m, (row, last)):
+        if abs(after - before) > COVERED * noise_m or _covers(x, noise_m, (row, last)):
             found.append(Move(-1 if first == 0 else row, x.size if end == x.size - 1 else last))
     return found

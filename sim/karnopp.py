@@ -58,7 +58,9 @@ SLIP = 2
 TOLERANCE = 1e-5
 """Of one sub-step on the velocity, relative to |v| + v_s, where nothing else is asked for."""
 MOST_SUBSTEPS, MOST_MODE_CHANGES = 100_000, 1000
-"""Of one step, beyond which there is no answer (NaN): no stem is so stiff."""
+"""Of one step, beyond which there is no answer (NaN): no stem is so stiff;"""
+BORNE = 1e-6
+"""but one that is borne to so much of F_s is at rest: out of a damped stop it breaks loose and sticks ever less."""
 SHORTEST_SUBSTEP = 2.0**-20
 """Sub-step, in steps, that is taken whatever its error: a kink of a force is passed there."""
 EXPONENTIAL_ANGLE = 0.15
@@ -426,7 +428,8 @@ def step(
     while tau < h and not (held and mode == STUCK):
         changes += 1
         if changes > MOST_MODE_CHANGES:
-            return nan, nan, SLIP, sigma
+            left = excess(valve, stem_at(drive, tau, x, 0.0), q, z)
+            return (x, 0.0, STUCK, 0.0) if abs(left) < BORNE * valve.F_s else (nan, nan, SLIP, sigma)
         if mode == STUCK:
             tau, mode, sigma = wait(valve, drive, tau, h, x, sigma, q, z)
             continue
