@@ -227,7 +227,7 @@ def _parallel(lines: Sequence[Line], slope_pa_per_m: Figure) -> tuple[Line, ...]
         return tuple(lines)
     slope = 1.0 / slope_pa_per_m.value
     std = slope**2 * (slope_pa_per_m.plus_minus or 0.0) / THRESHOLDS.sigmas
-    agree = all(abs(each.slope - slope) <= THRESHOLDS.sigmas * each.slope_std for each in lines)
+    agree = all(abs(each.slope - slope) <= THRESHOLDS.parallel_sigmas * each.slope_std for each in lines)
     return tuple(each.of_slope(slope, std**2) for each in lines) if agree else tuple(lines)
 
 

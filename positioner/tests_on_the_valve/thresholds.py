@@ -48,6 +48,9 @@ class Thresholds:
     """Of a leg, in which the position is averaged for the first guess."""
     passes: int = 6
     """Of the choice of rows: each takes them by the line before; the fourth changes nothing any more."""
+    parallel_sigmas: float = 3.0
+    """Deviations of a line's slope within which it is the spring's: of six lines of one slope, one in 60 times one lies
+    beyond; at two deviations, one time in four."""
     same_rate: float = 0.1
     """Rates that differ by less are one."""
     held: float = 0.1
