@@ -110,7 +110,7 @@ def test_steps_and_continuous_stroke_are_played_one_at_a_time_and_power_that_is_
             with subprocess.Popen(command, stderr=subprocess.PIPE, text=True) as tester:
                 wait_until_it_plays(site)
                 assert main(["pst", *words]) == 1
-                assert "an experiment is under way already" in capsys.readouterr().err
+                assert "an experiment is under way" in capsys.readouterr().err
                 site.daemon.kill()
                 assert tester.stderr is not None
                 assert tester.stderr.read().count("\n") == 1
