@@ -85,7 +85,8 @@ def participles(path: Path) -> Iterator[tuple[str, int]]:
 def finds() -> dict[str, list[str]]:
     """Return each find with its place, by what it is."""
     found: dict[str, list[str]] = {"long sentences": [f"{page}: {text}" for page, text in long_sentences()]}
-    bare, named, values = [], [], defaultdict(lambda: defaultdict[str, list[str]](list))
+    bare, named = [], []
+    values: defaultdict[str, defaultdict[str, list[str]]] = defaultdict(lambda: defaultdict(list))
     for path in sorted(path for room in FLOORS for path in (ROOT / room).rglob("*.py")):
         where = path.relative_to(ROOT).as_posix()
         for name, value, line, explained in constants(path):
