@@ -22,7 +22,7 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
         type=Path,
         action="append",
         metavar="CONFIG.toml",
-        help="a daemon's file, with all its valves; may stand several times",
+        help="a daemon's file, with all its valves; may be given several times",
     )
     parser.add_argument("--host", help="host of the daemon, where there is no --config (127.0.0.1)")
     parser.add_argument("--port", type=int, help="its supervisory port (5502)")

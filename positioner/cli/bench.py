@@ -4,7 +4,7 @@ import argparse
 import sys
 from pathlib import Path
 
-HELP = "run the open benchmark of this and other methods, on loops and effects with known truth"
+HELP = "score this and other methods on loops and effects whose true cause is known"
 EXAMPLE = "positioner bench cases --drawn 300"
 RESULTS = "results.csv"
 

@@ -200,7 +200,9 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
         action="store_true",
         help="add an effect to the valve, find it in the daemon's recording, and give it to the law",
     )
-    parser.add_argument("--loop", choices=("flow",), help="put each law into a flow loop in virtual time, in a clone")
+    parser.add_argument(
+        "--loop", choices=("flow",), help="put each law into a flow loop in virtual time; needs a clone"
+    )
     parser.add_argument("--out", type=Path, metavar="DIR", help="folder for picture, recordings, files and logs")
     parser.add_argument("--json", type=Path, metavar="FILE", help="write the result as JSON")
 

@@ -25,7 +25,7 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
         help="standard deviation of the position's noise (measured in the recording)",
     )
     parser.add_argument(
-        "--pressure", choices=("held", "linear"), help="how the pressure goes between samples (the likelier of both)"
+        "--pressure", choices=("held", "linear"), help="pressure between samples: held or linear (the likelier)"
     )
     add_export_arguments(parser)
 

@@ -11,7 +11,7 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
     """Declare the command line."""
     parser.add_argument("format", choices=["fmu"], help="the format")
     parser.add_argument("valve", metavar="VALVE.toml", help="a valve file, or the name of a shipped valve")
-    parser.add_argument("-o", "--out", type=Path, required=True, metavar="VALVE.fmu")
+    parser.add_argument("-o", "--out", type=Path, required=True, metavar="VALVE.fmu", help="the FMU")
 
 
 def run(arguments: argparse.Namespace) -> int:

@@ -22,7 +22,7 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
     )
     parser.add_argument("--fit", type=Path, nargs="+", required=True, metavar="REC", help="one or several recordings")
     add_test(parser)
-    parser.add_argument("-o", "--out", type=Path, required=True, metavar="NEW.toml")
+    parser.add_argument("-o", "--out", type=Path, required=True, metavar="NEW.toml", help="the new valve file")
     parser.add_argument("--json", type=Path, metavar="FILE", help="write all numbers as JSON")
     parser.add_argument("--report", type=Path, metavar="FILE.html", help="write the journal for a browser")
     add_pressure(parser)

@@ -13,7 +13,9 @@ EXAMPLE = "positioner loops plant.csv --report plant.html"
 def add_arguments(parser: argparse.ArgumentParser) -> None:
     """Declare the command line."""
     parser.add_argument("manifest", type=Path, metavar="MANIFEST", help="CSV: loop, file, and time, op, pv, sp, mode")
-    parser.add_argument("--out", type=Path, metavar="FOLDER", help="folder of what is worked out, as `fleet` has it")
+    parser.add_argument(
+        "--out", type=Path, metavar="FOLDER", help="folder of results; a later run examines only what is new"
+    )
     parser.add_argument("--workers", type=int, metavar="N", help="number of processes (one a core)")
     parser.add_argument("--json", type=Path, metavar="FILE", help="write the result as JSON")
     parser.add_argument("--report", type=Path, metavar="FILE.html", help="write the ranking for a browser")

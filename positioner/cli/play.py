@@ -44,7 +44,7 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
     parser.add_argument("--period-s", type=float, default=1e-3, help="period of the control loop (1e-3)")
     parser.add_argument("--noise-m", type=float, default=0.0, help="standard deviation of the sensor's noise (0)")
     parser.add_argument("--seed", type=int, default=0, help="seed of the noise (0)")
-    parser.add_argument("-o", "--out", type=Path, required=True, metavar="REC.csv")
+    parser.add_argument("-o", "--out", type=Path, required=True, metavar="REC.csv", help="the recording")
 
 
 @dataclass(frozen=True, slots=True)

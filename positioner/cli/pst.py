@@ -27,7 +27,7 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
     """Declare the command line."""
     add_test_arguments(parser, recordings=False)
     _add_share(parser, "--travel", 0.1, "travel of the test, share of the stroke (0.1)")
-    _add_share(parser, "--beyond", 0.05, "more travel than that ends the test (0.05)")
+    _add_share(parser, "--beyond", 0.05, "travel beyond --travel that ends the test (0.05)")
     _add_share(parser, "--least", None, "least travel to pass (0.8 of --travel)")
     _add_share(parser, "--start", 0.005, "travel that counts as break-out (0.005)")
     parser.add_argument("--towards", choices=("open", "closed"), help="direction (away from the nearer end)")
@@ -40,7 +40,7 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
         help="dangerous undetected failures; prints PFD_avg with and without the test",
     )
     _add_share(parser, "--partial-coverage", 0.6, "share of these failures that the partial stroke shows (0.6)")
-    _add_share(parser, "--proof-coverage", 0.9, "share that the proof test shows (0.9)")
+    _add_share(parser, "--proof-coverage", 0.9, "share of these failures that the proof test shows (0.9)")
     parser.add_argument(
         "--every-days", type=float, default=30.0, metavar="DAYS", help="interval of the partial stroke test (30)"
     )

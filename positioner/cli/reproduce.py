@@ -9,7 +9,7 @@ from pathlib import Path
 from positioner.cli.parts.clone_only import benchmark
 from positioner.cli.parts.output_files import make_folder, writable
 
-HELP = "print the paper's figures and claims, in two minutes; in a clone of the project alone"
+HELP = "print the paper's figures and claims, in two minutes; needs a clone of the project"
 EXAMPLE = "positioner reproduce --out figures --json reproduced.json"
 
 

@@ -17,7 +17,7 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
         metavar="PRESSURE.csv",
         help="columns time_s and command_pa; each pressure holds until the next row (with a positioner: reference_m)",
     )
-    parser.add_argument("-o", "--out", type=Path, required=True, metavar="REC.csv")
+    parser.add_argument("-o", "--out", type=Path, required=True, metavar="REC.csv", help="the recording")
     parser.add_argument("--noise-m", type=float, default=0.0, help="standard deviation of the sensor's noise (0)")
     parser.add_argument("--seed", type=int, default=0, help="seed of the noise (0)")
 

@@ -22,11 +22,13 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
         "--friction-percent",
         type=float,
         metavar="F",
-        help="pressure between opening and closing, %% of the range (5; PTFE 2-6, graphite 5-15)",
+        help="pressure difference between opening and closing, %% of the range (5; PTFE 2-6, graphite 5-15)",
     )
-    parser.add_argument("--breakaway-ratio", type=float, metavar="R", help="break-away over sliding friction (1.3)")
-    parser.add_argument("--mass-kg", type=float, metavar="KG", help="plate, stem and plug (8 kg at 700 cm2)")
-    parser.add_argument("--name", default="from data sheet", help="of the valve")
+    parser.add_argument(
+        "--breakaway-ratio", type=float, metavar="R", help="ratio of break-away to sliding friction (1.3)"
+    )
+    parser.add_argument("--mass-kg", type=float, metavar="KG", help="mass of plate, stem and plug (8 at 700 cm2)")
+    parser.add_argument("--name", default="from data sheet", help="name of the valve")
     parser.add_argument("--of", metavar="VALVE.toml", help="begin with this valve file, or a shipped valve's name")
     parser.add_argument(
         "--set",
@@ -36,7 +38,7 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
         help="with --of: change a parameter (SI units), as coulomb_n=1300 or preload.force_n=467",
     )
     parser.add_argument("--without", nargs="+", default=[], metavar="EFFECT", help="with --of: leave these effects out")
-    parser.add_argument("-o", "--out", type=Path, required=True, metavar="V.toml")
+    parser.add_argument("-o", "--out", type=Path, required=True, metavar="V.toml", help="the valve file")
 
 
 def run(arguments: argparse.Namespace) -> int:

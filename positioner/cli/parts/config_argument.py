@@ -19,7 +19,13 @@ def add_config(
     """
     parser.add_argument("config", type=Path, nargs="*" if many else "?", metavar=metavar, help=text)
     parser.add_argument(
-        "--config", dest="config_option", type=Path, action="append", default=[], metavar=metavar, help="the same"
+        "--config",
+        dest="config_option",
+        type=Path,
+        action="append",
+        default=[],
+        metavar=metavar,
+        help="the same file, as an option",
     )
 
 

@@ -24,7 +24,7 @@ def add_export_arguments(parser: argparse.ArgumentParser) -> None:
     parser.add_argument("--from-s", type=float, metavar="S", help="leave out samples before this time_s")
     parser.add_argument("--to-s", type=float, metavar="S", help="leave out samples after this time_s")
     export = parser.add_argument_group(
-        "exports in place of recordings", "CSV, .xlsx, .mat, Parquet; `positioner import FILE` proposes these words"
+        "exports in place of recordings", "CSV, .xlsx, .mat, Parquet; `positioner import FILE` proposes these options"
     )
     export.add_argument(
         "--column",
