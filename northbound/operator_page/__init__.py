@@ -16,6 +16,6 @@ Its files:
     signed_in               which role is in front of a tab
     alarm_card              the alarms: seen, shelved
     test_card               tests on the valve: begun with consent, broken off, reported
-    moves_ahead, question   what a command is going to do, and the question before it is given
+    moves_ahead, dialog     what a command is going to do, and the question before it is given
     facts                   what is said of a valve, a line each
 """

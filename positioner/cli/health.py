@@ -6,7 +6,7 @@ from typing import TYPE_CHECKING
 from positioner.cli.parts.daemon_address import add_connection, connect_dcs
 
 if TYPE_CHECKING:
-    from positioner.daemon.health.operation import OperationDay
+    from positioner.daemon.health.daily_figures import OperationDay
 
 HELP = "print NE 107 status, wear and today's figures of a valve; with --config also those of earlier days"
 EXAMPLE = "positioner health --config daemon.toml"
@@ -66,7 +66,7 @@ def _print_day(day: "OperationDay") -> None:
     """Print a day: a line, and its histograms."""
     import datetime
 
-    from positioner.daemon.health.operation import DAY_S, DEVIATIONS, OPENINGS
+    from positioner.daemon.health.daily_figures import DAY_S, DEVIATIONS, OPENINGS
     from positioner.daemon.health.travel_accumulator import SPANS
 
     date = datetime.datetime.fromtimestamp(day.day * DAY_S, datetime.UTC).date()

@@ -51,7 +51,7 @@ from positioner.daemon.cycle import Cycle
 from positioner.daemon.cycle_statistics import CycleStatistics
 from positioner.daemon.experiment_registers import WriteRejected, experiment_asked, experiment_getters
 from positioner.daemon.health import Health, ne107_condition
-from positioner.daemon.health.operation import end_trend
+from positioner.daemon.health.daily_figures import end_trend
 from positioner.daemon.local_switch import require_let_in
 from positioner.daemon.logs import log_event, logging_valve
 from positioner.daemon.service_state import state_by_mode

@@ -1,4 +1,4 @@
-"""What methods say of a case: ours, and He's, Hägglund's, Horch's and Kano's (`workbench.loops.shape_methods`).
+"""What methods say of a case: ours, and He's, Hägglund's, Horch's and Kano's (`workbench.loops.literature_votes`).
 
 Of a loop of several records ours takes the mean of their evidence, the others the median of their indices. Of OP alone
 ours has a score and calls none, He's method has its index, and the others nothing.
@@ -16,9 +16,9 @@ from workbench.diagnosis.diagnosis import diagnose
 from workbench.loops import LoopDiagnosis, LoopRecord, diagnose_loop
 from workbench.loops.calibration import CALIBRATION, Evidence, Witness, mean_evidence
 from workbench.loops.joint import together
+from workbench.loops.literature_votes import Vote, he
 from workbench.loops.loop_diagnosis import output_alone
 from workbench.loops.oscillation import find_oscillation
-from workbench.loops.shape_methods import Vote, he
 from workbench.loops.thresholds import LIMITS
 
 OURS = "positioner"

@@ -15,7 +15,7 @@ answers: sticks (how much, how sure), something else (what), cannot be told (why
     stem_and_process    PV as a stem and a process make it of OP, and how likely that is, compiled
     causes              causes held against each other by likelihood
     calibration         from evidence to the probability that the valve sticks
-    shape_methods       methods of the literature, which vote beside it
+    literature_votes    methods of the literature, which vote beside it
     remedies            what to do: retune or compensate, simulated on the identified loop
     plant               many loops: ranked, and which of them oscillate together
     loop_report         all of it as a page

@@ -12,11 +12,11 @@ from config.results.result import Result
 from workbench.loops.calibration import CALIBRATION, Evidence, Witness
 from workbench.loops.causes import Causes, fitted_path, hold_causes, of_output, rows_of
 from workbench.loops.controller_law import ControllerLaw, see_law
+from workbench.loops.literature_votes import Vote, votes
 from workbench.loops.loop_record import LoopRecord
 from workbench.loops.oscillation import Oscillation, find_oscillation
 from workbench.loops.quality_gates import Gate, closed_gates
 from workbench.loops.remedies import Remedy, find_remedies
-from workbench.loops.shape_methods import Vote, votes
 from workbench.loops.thresholds import LIMITS
 
 if TYPE_CHECKING:

@@ -8,7 +8,7 @@ counts over restarts.
     ne107                                   status and causes
     valve_conditions                        what is looked at once a second: limits, tests that are due, another spring
     packing_tests, e_detector               friction and stiction, by tests that keep a promise about false alarms
-    operation                               how it is used, day by day: histograms, ends, course, leak, supply, air
+    daily_figures                           how it is used, day by day: histograms, ends, course, leak, supply, air
     position_limits                         limits of the opening, with dead band and delay
     health_keeper, health_file              logs the status, stores the counts
 """

@@ -16,7 +16,7 @@ from pydantic import Field, ValidationError
 from config.errors import InputError
 from config.loading import Many, NonNegative, Schema
 from config.whole_file import replace_whole
-from positioner.daemon.health.operation import OperationDay
+from positioner.daemon.health.daily_figures import OperationDay
 from positioner.daemon.health.valve_conditions import CauseName, KeptConditions
 
 VERSION = 1

@@ -21,8 +21,8 @@ from positioner.control.controller_memory import Decision
 from positioner.control.requests import Requests
 from positioner.control.sample import Sample
 from positioner.control.travel.cutoffs import WITHIN, sent_to_m
+from positioner.daemon.health.daily_figures import Operation, Turned
 from positioner.daemon.health.health_file import HealthRecord
-from positioner.daemon.health.operation import Operation, Turned
 from positioner.daemon.health.packing_tests import FoundFriction, PackingLimits
 from positioner.daemon.health.stiction_index import StictionIndex
 from positioner.daemon.health.travel_accumulator import TravelAccumulator

@@ -4,10 +4,10 @@ import numpy as np
 import pytest
 
 from workbench.loops.controller_law import see_law
+from workbench.loops.literature_votes import hagglund, he, horch
 from workbench.loops.loop_record import LoopRecord
 from workbench.loops.oscillation import find_oscillation
 from workbench.loops.quality_gates import turns
-from workbench.loops.shape_methods import hagglund, he, horch
 
 TIME = np.arange(1000.0)
 SINE = np.sin(2.0 * np.pi * TIME / 40.0)

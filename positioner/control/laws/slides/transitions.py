@@ -184,7 +184,7 @@ def as_near_as_slides_land(memory: SlideMemory, now: Now) -> SlideMemory | None:
 def no_slide_left(memory: SlideMemory, now: Now) -> SlideMemory | None:
     """End the move: it has had its slides, save the second of two."""
     ended = memory.move.left <= 0 and not isinstance(memory.state, Out)
-    return _barred(memory, now, InhibitReason.TRIM_ENDED) if ended else None
+    return _stuck_or_barred(memory, now, InhibitReason.TRIM_ENDED) if ended else None
 
 
 def one_slide(memory: SlideMemory, now: Now) -> SlideMemory | None:
@@ -195,7 +195,7 @@ def one_slide(memory: SlideMemory, now: Now) -> SlideMemory | None:
     wanted_pa = now.balance.slide_pa(slide.from_m, slide.to_m, slide.direction)
     if now.bounds.allowed_pa(wanted_pa) == memory.command_pa:  # under which it rests: it holds the stem
         beyond = not now.bounds.allows(wanted_pa)
-        return _barred(memory, now, InhibitReason.LAW_BEYOND_LIMITS) if beyond else None
+        return _stuck_or_barred(memory, now, InhibitReason.LAW_BEYOND_LIMITS) if beyond else None
     return _slide(memory, now, slide.from_m, slide.to_m, slide.direction)
 
 
@@ -251,7 +251,7 @@ def two_slides(memory: SlideMemory, now: Now) -> SlideMemory:
     """Give the first of two slides, by whichever side it may, and what is left of the day's travel allows; or end."""
     seen, bounds = now.seen, now.bounds
     if memory.move.left < 2:  # it is to come back
-        return _barred(memory, now, InhibitReason.TRIM_ENDED)
+        return _stuck_or_barred(memory, now, InhibitReason.TRIM_ENDED)
     from_m = _standing_m(memory, now)
     plan, spent = now.plan(memory, from_m), memory.excursions
     begun, reasons = memory.move.begun or bool(memory.course and memory.course.changes_m), []
@@ -264,7 +264,7 @@ def two_slides(memory: SlideMemory, now: Now) -> SlideMemory:
         slide = _slide_from(memory, from_m, each.by_m, each.direction)
         command_pa = bounds.allowed_pa(now.balance.slide_pa(from_m, each.by_m, each.direction))
         if command_pa == memory.command_pa:
-            return _barred(memory, now, InhibitReason.TRIM_ENDED)
+            return _stuck_or_barred(memory, now, InhibitReason.TRIM_ENDED)
         out = Out(
             slide=slide,
             given_s=seen.now_s,
@@ -281,7 +281,7 @@ def two_slides(memory: SlideMemory, now: Now) -> SlideMemory:
         )
     if InhibitReason.EXCURSION_BUDGET_SPENT in reasons:
         return _idle(memory, InhibitReason.EXCURSION_BUDGET_SPENT)
-    return _barred(memory, now, max(reasons, key=lambda each: each is InhibitReason.LAW_BEYOND_LIMITS))
+    return _stuck_or_barred(memory, now, max(reasons, key=lambda each: each is InhibitReason.LAW_BEYOND_LIMITS))
 
 
 def _rest(now: Now) -> Rest:
@@ -370,7 +370,7 @@ def _idle(memory: SlideMemory, reason: InhibitReason) -> SlideMemory:
     return replace(memory, state=Idle(reason))
 
 
-def _barred(memory: SlideMemory, now: Now, reason: InhibitReason) -> SlideMemory:
+def _stuck_or_barred(memory: SlideMemory, now: Now, reason: InhibitReason) -> SlideMemory:
     """End the move where a bound bars a longer slide: for that reason, or, where nothing breaks loose, for that.
 
     A stem is stuck that slides in a row have not moved, each as long as has broken it loose before, or one that was to

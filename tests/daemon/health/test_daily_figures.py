@@ -18,8 +18,8 @@ from fieldbus.modbus.server import RegisterServer
 from positioner.cli.main import main
 from positioner.control.travel.cutoffs import HIGH, LOW
 from positioner.daemon.health import Health, HealthKeeper, StoredHealth
+from positioner.daemon.health.daily_figures import DAYS, Operation, Turned, end_trend
 from positioner.daemon.health.health_file import kept_days
-from positioner.daemon.health.operation import DAYS, Operation, Turned, end_trend
 from positioner.daemon.health.travel_accumulator import SPANS, TravelAccumulator
 from positioner.estimation.acceptance import Ratios
 from tests.daemon.health.test_valve_health import LAW, STROKE_M, Panel, in_automatic
