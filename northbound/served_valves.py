@@ -38,7 +38,7 @@ def certificates(arguments: argparse.Namespace) -> "tuple[Tls | None, dict[Role,
     import ssl
 
     from config.errors import InputError
-    from fieldbus.modbus.tls import identity_in
+    from fieldbus.modbus.client_roles import identity_in
 
     if arguments.tls is None:
         if arguments.write_tls:

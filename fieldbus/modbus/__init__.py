@@ -8,5 +8,5 @@ Its files:
     framing, host_address                   how frames lie in its stream; where its server is
     serial_line, terminal, rtu              the serial line, what it is on POSIX, and the frames on it
     pdu, exception_codes, layout            what frames carry; how a refusal is said; values in registers
-    tls                                     Modbus/TCP Security: mutual TLS, roles from certificates
+    tls, client_roles                       Modbus/TCP Security: mutual TLS; who a client is, and what its role permits
 """

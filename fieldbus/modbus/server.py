@@ -27,11 +27,12 @@ from pymodbus.constants import ExcCodes
 
 from config.errors import InputError
 from fieldbus.modbus.admission import Admitted, Allowance, Places, ServerLimits
+from fieldbus.modbus.client_roles import NOBODY, Identity, NotAuthorized
 from fieldbus.modbus.connection import Connection, endpoint
 from fieldbus.modbus.exception_codes import exception_reply
 from fieldbus.modbus.register_answers import RegisterAnswers, Registers
 from fieldbus.modbus.request_counts import RequestCounts
-from fieldbus.modbus.tls import NOBODY, Guard, Identity, NotAuthorized, failure_reason
+from fieldbus.modbus.tls import Guard, failure_reason
 
 log = logging.getLogger(__name__)
 

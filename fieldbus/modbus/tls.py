@@ -1,62 +1,30 @@
 """Modbus/TCP Security: mutual TLS round Modbus TCP, and roles from certificates.
 
 Both ends show a certificate that the other's authority has signed; the client also checks that the server's was made
-for the host it called. TLS 1.2 or newer, by the standard library. The client's certificate names its role in the
-extension 1.3.6.1.4.1.50316.802.1 (a UTF8String: observer, operator or engineer). What the role does not permit is
-refused with exception 1, as the protocol has it, and one line in the log.
+for the host it called. TLS 1.2 or newer, by the standard library. Who a client is, and what it may: `client_roles.py`.
 
 A server reads its files anew when they change: certificates are replaced, and revoked, without a restart. A session
 ends with its certificate, and when that is revoked. Of files that do not fit the log tells, and those before stay.
 """
 
-import errno
 import logging
-import math
 import re
 import socket
 import ssl
 import stat
-import struct
 import time
-from collections.abc import Callable
-from dataclasses import dataclass
 from datetime import datetime
 from pathlib import Path
 
 from config.errors import InputError
-from config.roles import Role
 from config.tls_table import Tls
+from fieldbus.modbus.client_roles import Identity, Writers, authorize, identity_in
 
 log = logging.getLogger(__name__)
 
-ROLE_OID = "1.3.6.1.4.1.50316.802.1"
-_UTF8_STRING = 0x0C
 LOOK_EVERY_S = 1.0
 """How often a server looks whether its files have changed, while somebody asks for something."""
 PEM_LIST = re.compile(rb"-----BEGIN X509 CRL-----.*?-----END X509 CRL-----\n?", re.DOTALL)
-MOST_WRITTEN = 123
-"""Registers that one request may write."""
-
-Writers = Callable[[int], Role]
-"""From a register's address to the role that may write it."""
-
-
-@dataclass(frozen=True, slots=True)
-class Identity:
-    """Who a verified certificate says its owner is."""
-
-    name: str
-    role: Role
-    until_s: float = math.inf
-    """When the certificate ends, s since 1970."""
-    serial: int = 0
-    """Its number, by which it may be revoked."""
-
-    def __str__(self) -> str:
-        return f"{self.name} ({self.role.name.lower()})"
-
-
-NOBODY = Identity("nobody", Role.NONE)
 HUNG_UP = ssl.SSLEOFError, ssl.SSLZeroReturnError, ssl.SSLSyscallError
 """What OpenSSL raises, by the moment, where the other end is gone; the last two give no reason."""
 
@@ -112,10 +80,6 @@ def _ends_of_lists(file: Path) -> list[datetime]:
         return [end for each in lists if (end := each.next_update_utc) is not None]
     except (ValueError, TypeError, x509.InvalidVersion):
         raise InputError(str(file), "holds a list of revoked certificates that cannot be read") from None
-
-
-class NotAuthorized(Exception):
-    """A request that the client's role does not permit; the text says which role does."""
 
 
 class Guard:
@@ -183,68 +147,12 @@ class Guard:
         log.info("certificates have changed and are in use")
 
     def authorize(self, identity: Identity, pdu: bytes) -> None:
-        """Check that a client's role permits a request (MODBUS/TCP Security Protocol Specification, section 8.3).
+        """Check that a client's role permits a request.
 
         Raises:
-            NotAuthorized: it needs a higher role, that of the highest register written.
+            NotAuthorized: it needs a higher role.
         """
-        first, count = _written_range(pdu)
-        needed = max((self._writers(address) for address in range(first, first + count)), default=Role.OBSERVER)
-        if identity.role < needed:
-            raise NotAuthorized(f"function {pdu[0]} needs the role {needed.name.lower()}")
-
-
-def identity_in(certificate: bytes) -> Identity:
-    """Return who a certificate (DER) says its owner is.
-
-    Raises:
-        ConnectionAbortedError: it cannot be read, though an authority has signed it.
-    """
-    from cryptography import x509
-    from cryptography.exceptions import UnsupportedAlgorithm
-
-    unreadable = (ValueError, TypeError, UnsupportedAlgorithm, x509.InvalidVersion, x509.DuplicateExtension)
-    try:
-        return _identity_in(certificate)
-    except (*unreadable, x509.UnsupportedGeneralNameType):
-        raise ConnectionAbortedError(errno.ECONNABORTED, "its certificate cannot be read") from None
-
-
-def _identity_in(certificate: bytes) -> Identity:
-    from cryptography import x509
-
-    parsed = x509.load_der_x509_certificate(certificate)
-    names = parsed.subject.get_attributes_for_oid(x509.NameOID.COMMON_NAME)
-    name = str(names[0].value) if names else "nameless"
-    until_s = parsed.not_valid_after_utc.timestamp()
-    for extension in parsed.extensions:
-        if extension.oid.dotted_string == ROLE_OID and isinstance(extension.value, x509.UnrecognizedExtension):
-            return Identity(name, _role(extension.value.value), until_s, parsed.serial_number)
-    return Identity(name, Role.NONE, until_s, parsed.serial_number)
-
-
-def role_extension(role: Role) -> bytes:
-    """Return a role as the extension's value (DER)."""
-    text = role.name.lower().encode()
-    return bytes((_UTF8_STRING, len(text))) + text
-
-
-def _role(value: bytes) -> Role:
-    return next((role for role in Role if role and role_extension(role) == value), Role.NONE)
-
-
-def _written_range(pdu: bytes) -> tuple[int, int]:
-    """Return first address and number of the registers that a request writes; 0 of them for all else.
-
-    A count that no request may have is not walked through: the request is refused in any case.
-    """
-    if pdu[0] == 6 and len(pdu) >= 3:
-        return int.from_bytes(pdu[1:3]), 1
-    at = {16: 1, 23: 5}.get(pdu[0])
-    if at is None or len(pdu) < at + 4:
-        return 0, 0
-    address, count = struct.unpack(">HH", pdu[at : at + 4])
-    return address, min(count, MOST_WRITTEN)
+        authorize(identity, pdu, self._writers)
 
 
 def _server_context(tls: Tls) -> ssl.SSLContext:

@@ -89,7 +89,7 @@ def thin_columns(columns: Mapping[str, Column], step_s: float) -> dict[str, Colu
     """Return at most three rows a step of time, s: the least and the greatest position in it, and where one is missing.
 
     >>> rows = {"time_s": np.array([0.0, 0.1, 0.2, 1.0, 2.0]), "position_m": np.array([3.0, 1.0, 2.0, 5.0, np.nan])}
-    >>> thinned(rows, 1.0)["position_m"].tolist()
+    >>> thin_columns(rows, 1.0)["position_m"].tolist()
     [3.0, 1.0, 5.0, nan]
     """
     time_s, position_m = columns["time_s"], columns["position_m"]

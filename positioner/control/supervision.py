@@ -1,5 +1,7 @@
 """Supervision: did the daemon run, is the measurement fresh and plausible, does the DCS live, who commands?
 
+What must not last, as a sensor that is frozen or a stem away from its reference, is found by `monitors.py`.
+
 It knows nothing of the law. A fault is latched: the mode falls to hold, the safe action commands, and only an
 acknowledgement after its cause is gone frees the way; then a person or the DCS must choose a mode again. A fault whose
 action is manual leaves the valve to an operator instead: the mode falls to manual, unless it was hold, and the pressure

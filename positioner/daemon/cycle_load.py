@@ -7,6 +7,7 @@ An interpreter uses one processor, however many there are: a daemon whose cycles
 daemon's own cycle on a device in memory, which answers at once, times `ON_THE_WIRE`.
 """
 
+import logging
 import os
 import time
 from collections.abc import Sequence
@@ -14,13 +15,17 @@ from dataclasses import dataclass
 from math import ceil
 
 from config.daemon_file import DaemonFile
+from config.errors import InputError
 from drivers.in_memory import MemoryDriver
 from positioner.control.controller import Controller
 from positioner.control.requests import Requests
 from positioner.control.settings import Settings
 from positioner.daemon.cycle import Cycle
 from positioner.daemon.link import Link
+from positioner.daemon.logs import log_event
 from positioner.daemon.pacing import DevicePace
+
+log = logging.getLogger(__name__)
 
 ON_THE_WIRE = 4.0
 """Of the processor time in memory, that on a wire: frames, system calls, waiting for many descriptors at once.
@@ -71,6 +76,18 @@ class CycleLoad:
     def needed(self) -> int:
         """How many processes they need, of those that there may be."""
         return min(max(ceil(self.share / USABLE), ceil(self.lines / MOST_LINES), 1), self.processes)
+
+    def require_that_it_fits(self, source: str) -> None:
+        """Log a load that is more than there is.
+
+        Raises:
+            InputError: it is so much more that no busy moment explains it; the source is named.
+        """
+        if self.fits:
+            return
+        if self.share > IMPOSSIBLE * self.processes:
+            raise InputError(source, self.said)
+        log_event(log, logging.WARNING, "the valves need more than there is", load=self.said)
 
     @property
     def said(self) -> str:

@@ -14,7 +14,6 @@ from pathlib import Path
 from typing import Protocol
 
 from config.daemon_file import DaemonFile, SupervisoryTable
-from config.errors import InputError
 from config.extended_valve import ExtendedValve
 from config.registers import WRITER_AT
 from config.roles import Role
@@ -25,7 +24,7 @@ from fieldbus.modbus.request_counts import RequestCounts
 from fieldbus.modbus.server import RegisterServer
 from fieldbus.modbus.tls import Guard
 from positioner.daemon.assembled_valves import AssembledValves, Share
-from positioner.daemon.cycle_load import IMPOSSIBLE, cycle_load
+from positioner.daemon.cycle_load import cycle_load
 from positioner.daemon.ending import Endings
 from positioner.daemon.history import HistoryKeeper
 from positioner.daemon.logs import log_event, logging_valve, start_logging
@@ -120,10 +119,8 @@ def _processes(files: Sequence[DaemonFile], source: Path) -> int:
         InputError: they need much more than there is.
     """
     load = cycle_load(files)
-    if load is not None and not load.fits:
-        if load.share > IMPOSSIBLE * load.processes:
-            raise InputError(str(source), load.said)
-        log_event(log, logging.WARNING, "the valves need more than there is", load=load.said)
+    if load is not None:
+        load.require_that_it_fits(str(source))
     return files[0].service.processes or (1 if load is None else load.needed)
 
 

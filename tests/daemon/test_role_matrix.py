@@ -15,9 +15,10 @@ from config.codes import Mode
 from config.registers import BY_NAME, REGISTERS, SIZE, Register
 from config.roles import Role
 from fieldbus.modbus.admission import ServerLimits
+from fieldbus.modbus.client_roles import Identity, NotAuthorized
 from fieldbus.modbus.connection import HEADER
 from fieldbus.modbus.server import RegisterServer
-from fieldbus.modbus.tls import Identity, NotAuthorized, client_context
+from fieldbus.modbus.tls import client_context
 from positioner.daemon.service import guard_of
 from tests.certificates import tls
 from tests.daemon.test_supervisory_registers import Panel

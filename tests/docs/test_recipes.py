@@ -30,7 +30,7 @@ RECIPES = dict(re.findall(r"^## (.+)\n((?:(?!^##).*\n)+)", GUIDE, re.MULTILINE))
 BEING_WRITTEN = "*.pyc.*"
 """A compiled module that another process has not yet given its name."""
 BLOCK = re.compile(r"^```(\w+) ?([\w/.]*)\n(.*?)^```", re.MULTILINE | re.DOTALL)
-WANTED = {"An effect", "A register", "A fault", "A command", "A law"}
+WANTED = {"An effect", "A register", "A fault", "A command", "A law", "A check of doctor"}
 
 
 def test_there_is_a_recipe_for_all_that_is_added_often() -> None:

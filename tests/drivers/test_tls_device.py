@@ -27,8 +27,9 @@ from drivers.modbus_tcp import ModbusTcpDriver
 from fieldbus.modbus import server as server_module
 from fieldbus.modbus import tls as tls_module
 from fieldbus.modbus.admission import ServerLimits
+from fieldbus.modbus.client_roles import Identity, NotAuthorized, identity_in
 from fieldbus.modbus.server import RegisterServer
-from fieldbus.modbus.tls import Guard, Identity, NotAuthorized, client_context, failure_reason, identity_in
+from fieldbus.modbus.tls import Guard, client_context, failure_reason
 from sim.slave.clocks import Lockstep
 from sim.slave.device_registers import DeviceRegisters
 from sim.slave.modbus_slave import device_of
@@ -308,7 +309,7 @@ def test_a_role_that_is_not_known_to_the_letter_is_none(text: bytes) -> None:
     from cryptography import x509
     from cryptography.hazmat.primitives import serialization
 
-    from fieldbus.modbus.tls import ROLE_OID, _role
+    from fieldbus.modbus.client_roles import ROLE_OID, _role
 
     assert _role(b"\x0c" + bytes((len(text),)) + text) is Role.NONE
     parsed = x509.load_pem_x509_certificate((folder() / "engineer.pem").read_bytes())

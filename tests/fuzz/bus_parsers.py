@@ -22,10 +22,11 @@ from fieldbus.canopen import loopback
 from fieldbus.canopen.eds import read_eds
 from fieldbus.modbus.client import ModbusClient
 from fieldbus.modbus.client_errors import ClientError
+from fieldbus.modbus.client_roles import Identity, NotAuthorized
 from fieldbus.modbus.connection import HEADER, Connection
 from fieldbus.modbus.register_answers import RegisterAnswers
 from fieldbus.modbus.rtu import framed, is_whole
-from fieldbus.modbus.tls import Guard, Identity, NotAuthorized
+from fieldbus.modbus.tls import Guard
 from sim.slave.canopen_node import CanopenNode
 from sim.slave.clocks import Lockstep
 from sim.slave.device_registers import DeviceRegisters

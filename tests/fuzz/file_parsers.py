@@ -31,7 +31,8 @@ from config.roles import Role
 from config.slave_file import load_slave
 from config.valve_file import load_valve, shipped_valve
 from fieldbus.canopen.eds import read_eds
-from fieldbus.modbus.tls import ROLE_OID, Guard, expiry, identity_in, role_extension
+from fieldbus.modbus.client_roles import ROLE_OID, identity_in, role_extension
+from fieldbus.modbus.tls import Guard, expiry
 from positioner.daemon.health.health_file import HealthRecord, read_record, write_record
 from positioner.daemon.memory.memory_file import KEYS, VERSION, read_memory, write_memory
 from positioner.history.entries import Event

@@ -13,7 +13,7 @@ From the file to the recording:
     pandas_store                            data frames in HDF5, by their names
     reader_process                          that process: it may break down or come to no end, and nothing else does
     turned_tables                           a row a signal, a row a value: made a column a signal
-    export_units                            units, by all the names people give them
+    cell_units                              units, by all the names people give them
     column_mapping                          `OURS=THEIRS:UNIT`, `--status`, and how else an export is read
     header_search                           the line that names the columns, and the units about it
     cell_kinds, number_notation             what a cell may be; decimal signs and thousands separators

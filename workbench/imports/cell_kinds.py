@@ -1,4 +1,4 @@
-"""What a cell may be: a number or a date, a number with its unit behind it; and what cells in a column may be."""
+"""What a cell may be: a number or a date; and what cells in a column may be."""
 
 import re
 from collections.abc import Sequence
@@ -6,39 +6,16 @@ from collections.abc import Sequence
 import numpy as np
 import numpy.typing as npt
 
-from workbench.imports.export_units import PROCESS_UNITS, unit_named
-from workbench.imports.number_notation import is_numeral, number
+from workbench.imports.cell_units import with_any_unit
+from workbench.imports.number_notation import number
 from workbench.imports.raw_table import Cell
 
 _NUMBER_BEGINS = re.compile("[+\u2212-]?[.,]?\\d")
-_WITH_UNIT = re.compile(r"([+\u2212-]?[\d.,]+(?:[eE][+-]?\d+)?)\s*([^\d\s].*)")
 
 
 def begins_number(cell: Cell) -> bool:
     """Return whether a cell is, or begins as, a number or a date."""
     return not isinstance(cell, str) or _NUMBER_BEGINS.match(cell) is not None
-
-
-def split_unit(cell: str) -> tuple[str, str | None]:
-    """Return the numeral of a cell and the unit behind it, in our spelling; None where none stands there.
-
-    >>> parted("1,02 cm"), parted("949 mbar"), parted("50.1"), parted("12 furlong")
-    (('1,02', 'cm'), ('949', 'mbar'), ('50.1', None), ('12 furlong', None))
-    """
-    match = None if is_numeral(cell) else _WITH_UNIT.fullmatch(cell)
-    unit = unit_named(match[2]) if match else None
-    return (match[1], unit) if match and unit else (cell, None)
-
-
-def with_any_unit(cell: str) -> tuple[str, str]:
-    """Return the numeral of a cell and the unit behind it, ours or a process's; "" where none stands there.
-
-    >>> with_any_unit("12.3 m³/h"), with_any_unit("949 mbar"), with_any_unit("Bad Input")
-    (('12.3', 'm³/h'), ('949', 'mbar'), ('Bad Input', ''))
-    """
-    numeral, unit = split_unit(cell)
-    match = None if unit or is_numeral(cell) else _WITH_UNIT.fullmatch(cell)
-    return (match[1], match[2]) if match and PROCESS_UNITS.fullmatch(match[2]) else (numeral, unit or "")
 
 
 def numbers_of(cells: Sequence[Cell], decimal: str) -> npt.NDArray[np.float64]:

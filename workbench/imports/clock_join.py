@@ -21,7 +21,7 @@ import numpy as np
 
 from config.errors import InputError
 from config.recording import Column
-from workbench.imports.export_units import UNITS
+from workbench.imports.cell_units import UNITS
 
 MEASURED = ("position", "velocity", "pressure", "load", "current", "force", "torque")
 """How the names of columns begin that are measured."""

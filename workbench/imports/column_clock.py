@@ -15,8 +15,8 @@ import numpy as np
 
 from config.errors import InputError
 from config.recording import Column
-from workbench.imports.cell_kinds import numbers_of, split_unit
-from workbench.imports.export_units import UNITS
+from workbench.imports.cell_kinds import numbers_of
+from workbench.imports.cell_units import UNITS, split_unit
 from workbench.imports.number_notation import is_numeral
 from workbench.imports.raw_table import Cell
 from workbench.imports.sample_rows import Samples
@@ -88,6 +88,11 @@ def time_base(times: Column) -> TimeBase | None:
         return None
     first, step = float(finite[0]), float(np.median(np.abs(np.diff(finite))))
     return next((each for each in BASES if each.low < first < each.high and step < each.longest_step), None)
+
+
+def clock_by_rows(rows: int, period_s: float) -> Clock:
+    """Return the clock of rows that have no time: so far apart, from zero."""
+    return Clock(period_s * np.arange(rows, dtype=np.float64), None)
 
 
 def clock_of(

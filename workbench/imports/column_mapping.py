@@ -6,7 +6,7 @@ from dataclasses import dataclass
 
 from config.errors import InputError
 from config.recording import BEHIND_POSITIONER, OF_DRIVES, REQUIRED
-from workbench.imports.export_units import SHARES, UNITS, ending_of, list_allowed_units
+from workbench.imports.cell_units import SHARES, UNITS, ending_of, list_allowed_units
 
 RANGE_PA = (0.2e5, 1.0e5)
 """The pressures of 0 % and 100 % that are assumed, and told, where nobody says others: the field's 0.2 to 1 bar."""
@@ -95,7 +95,7 @@ def _source(word: str) -> Source:
 def list_units(ours: str) -> list[str]:
     """Return the units that a column of ours may be in, those from the other end too.
 
-    >>> offered_units("position_m")[:3], offered_units("position_m")[-1]
+    >>> list_units("position_m")[:3], list_units("position_m")[-1]
     (['m', 'cm', 'mm'], '-2-10V')
     """
     ending = ending_of(ours)

@@ -5,7 +5,7 @@ Names are taken apart at _, . and - and where capitals follow small letters: `st
 
 import re
 
-from workbench.imports.export_units import unit_in_header
+from workbench.imports.cell_units import unit_in_header
 
 SETPOINT = r"soll|\bsp\b|set ?point|consign|zadan|riferimento|b[öo]rv[äa]rde|gewenst|\breference\b"
 PROCESS_VALUE = (
@@ -59,7 +59,7 @@ def rank_by_name(ours: str, name: str) -> int | None:
 def split_words(name: str) -> str:
     """Return the words of a name.
 
-    >>> taken_apart("stemPos_mm")
+    >>> split_words("stemPos_mm")
     'stem Pos mm'
     """
     return re.sub(r"[_.-]+|(?<=[a-zäöü0-9])(?=[A-Z])", " ", name).strip()

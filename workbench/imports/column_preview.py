@@ -11,7 +11,7 @@ from itertools import islice
 from pathlib import Path
 
 from config.errors import InputError
-from workbench.imports.cell_kinds import split_unit, with_any_unit
+from workbench.imports.cell_units import split_unit, with_any_unit
 from workbench.imports.clock_groups import clock_places, signal_places
 from workbench.imports.column_names import STATUS, rank_by_name
 from workbench.imports.header_search import Header, guess_header

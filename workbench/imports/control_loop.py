@@ -21,8 +21,8 @@ from dataclasses import dataclass
 import numpy as np
 import numpy.typing as npt
 
+from workbench.imports.cell_units import PROCESS_UNITS, SHARES, UNITS
 from workbench.imports.column_names import COMMON, PROCESS_VALUE, SETPOINT, is_called, rank_by_name, split_words
-from workbench.imports.export_units import PROCESS_UNITS, SHARES, UNITS
 
 Array = npt.NDArray[np.float64]
 OUTPUT = COMMON["command_pa"][0]

@@ -5,7 +5,8 @@ from dataclasses import dataclass
 from pathlib import Path
 
 from config.results.block import Block, Table, as_text
-from workbench.imports.cell_kinds import numbers_of, with_any_unit
+from workbench.imports.cell_kinds import numbers_of
+from workbench.imports.cell_units import with_any_unit
 from workbench.imports.column_preview import (
     ColumnPreview,
     columns_of,

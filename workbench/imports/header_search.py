@@ -14,8 +14,8 @@ from pathlib import Path
 
 from config.errors import InputError
 from workbench.imports.cell_kinds import begins_number, may_be_clock
+from workbench.imports.cell_units import unit_in_header, unit_named
 from workbench.imports.column_names import rank_by_name
-from workbench.imports.export_units import unit_in_header, unit_named
 from workbench.imports.raw_table import Cell, RawTable
 
 SEARCHED = 300
@@ -109,7 +109,7 @@ def _header_of(path: Path, table: RawTable, wanted: Sequence[str], clock: str | 
 def distinguish_names(names: Sequence[str], above: Sequence[Cell]) -> tuple[str, ...]:
     """Return the names of a row; those that stand several times with what stands above their group before them.
 
-    >>> told_apart(["Time", "Value", "Time", "Value"], ["FV1.OP", "", "FV1.ZT", ""])
+    >>> distinguish_names(["Time", "Value", "Time", "Value"], ["FV1.OP", "", "FV1.ZT", ""])
     ('FV1.OP Time', 'FV1.OP Value', 'FV1.ZT Time', 'FV1.ZT Value')
     """
     several = {name for name, count in Counter(names).items() if count > 1 and name}

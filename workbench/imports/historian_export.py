@@ -15,11 +15,11 @@ import numpy as np
 
 from config.errors import InputError
 from config.recording import REQUIRED, Column, Recording
+from workbench.imports.cell_units import SHARES, UNITS
 from workbench.imports.clock_groups import find_groups
 from workbench.imports.clock_join import Group, align
-from workbench.imports.column_clock import Clock, clock_of
+from workbench.imports.column_clock import clock_by_rows, clock_of
 from workbench.imports.column_mapping import RANGE_PA, ExportOptions, Source
-from workbench.imports.export_units import SHARES, UNITS
 from workbench.imports.file_kind import raw_tables
 from workbench.imports.number_notation import decimal_sign
 from workbench.imports.raw_table import Cell
@@ -118,7 +118,7 @@ def _group(
     values = [each for each in sources if each is not theirs]
     if theirs is None:
         period_s = options.period_s or 1.0
-        clock = Clock(period_s * np.arange(len(part.lines), dtype=np.float64), None)
+        clock = clock_by_rows(len(part.lines), period_s)
         metadata["time_s"] = f"by the number of the row, rows {period_s:g} s apart"
     else:
         clock = clock_of(path, part, theirs.theirs, theirs.unit, options.time_format, decimal)

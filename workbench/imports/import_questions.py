@@ -4,11 +4,11 @@ from collections.abc import Callable, Sequence
 from math import isfinite, nan
 
 from config.errors import InputError
+from workbench.imports.cell_units import SHARES
 from workbench.imports.column_mapping import RANGE_PA, Source, read_mapping
 from workbench.imports.column_names import COMMON
 from workbench.imports.column_preview import GOOD, ColumnPreview
 from workbench.imports.export_preview import ExportPreview
-from workbench.imports.export_units import SHARES
 from workbench.imports.mapping_file import MappingTable
 
 Ask = Callable[[str, str], str]

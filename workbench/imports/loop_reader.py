@@ -13,12 +13,12 @@ import numpy as np
 import numpy.typing as npt
 
 from config.errors import InputError
-from workbench.imports.cell_kinds import may_be_clock, numbers_of, with_any_unit
+from workbench.imports.cell_kinds import may_be_clock, numbers_of
+from workbench.imports.cell_units import UNITS, with_any_unit
 from workbench.imports.clock_groups import find_groups
 from workbench.imports.column_clock import clock_of
 from workbench.imports.control_loop import LEAST_OUT, MOST_OUT, LoopColumns, loop_by_names, stem_by_name
 from workbench.imports.export_preview import ExportPreview, preview
-from workbench.imports.export_units import UNITS
 from workbench.imports.file_kind import raw_tables
 from workbench.imports.number_notation import decimal_sign
 from workbench.imports.proposal import is_clock

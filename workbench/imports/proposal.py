@@ -17,11 +17,11 @@ import numpy.typing as npt
 from config.drive import KINDS, VALVE
 from config.errors import InputError
 from workbench.imports.cell_kinds import begins_number, may_be_clock, numbers_of
+from workbench.imports.cell_units import SHARES, UNITS, ending_of, list_allowed_units, unit_named
 from workbench.imports.column_clock import time_base
 from workbench.imports.column_mapping import RANGE_PA
 from workbench.imports.column_names import COMMON, COUNTER, SETPOINT, STATUS, is_called, rank_by_name
 from workbench.imports.column_preview import GOOD, ColumnPreview, find_sign
-from workbench.imports.export_units import SHARES, UNITS, ending_of, list_allowed_units, unit_named
 from workbench.imports.raw_table import Cell
 from workbench.imports.time_stamps import propose_formats, seconds_of
 

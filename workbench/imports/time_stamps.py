@@ -132,9 +132,9 @@ def _unreadable(path: Path, texts: Sequence[str], row: int, line: int, time_form
 def propose_formats(texts: Sequence[str]) -> list[str]:
     """Return the formats that read all of some stamps, but for those that say the same, or make a midnight a month.
 
-    >>> proposed_formats(["01/02/2026 12:00:00"]), proposed_formats(["31/01/2026 12:00:00"])
+    >>> propose_formats(["01/02/2026 12:00:00"]), propose_formats(["31/01/2026 12:00:00"])
     (['%d/%m/%Y %H:%M:%S', '%m/%d/%Y %H:%M:%S'], ['%d/%m/%Y %H:%M:%S'])
-    >>> proposed_formats(["02/01/2026 23:59:59", "02/02/2026 00:00:00"])
+    >>> propose_formats(["02/01/2026 23:59:59", "02/02/2026 00:00:00"])
     ['%m/%d/%Y %H:%M:%S']
     """
     fractions = any(re.search(r":\d+[.,]\d+", text) for text in texts)

@@ -14,9 +14,9 @@ from functools import partial
 from itertools import islice, zip_longest
 
 from config.errors import InputError
-from workbench.imports.cell_kinds import begins_number, split_unit
+from workbench.imports.cell_kinds import begins_number
+from workbench.imports.cell_units import split_unit, unit_named
 from workbench.imports.column_names import COUNTER, STATUS, is_called, rank_by_name
-from workbench.imports.export_units import unit_named
 from workbench.imports.header_search import Header, guess_header
 from workbench.imports.number_notation import is_numeral
 from workbench.imports.raw_table import Cell, RawTable

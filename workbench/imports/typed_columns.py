@@ -14,9 +14,18 @@ import numpy as np
 
 from config.errors import InputError
 from config.recording import REQUIRED, Column
-from workbench.imports.cell_kinds import begins_number, split_unit
+from workbench.imports.cell_kinds import begins_number
+from workbench.imports.cell_units import (
+    ABSOLUTE,
+    ATMOSPHERE_PA,
+    SHARES,
+    SI,
+    UNITS,
+    ending_of,
+    list_allowed_units,
+    split_unit,
+)
 from workbench.imports.column_mapping import Source
-from workbench.imports.export_units import ABSOLUTE, ATMOSPHERE_PA, SHARES, SI, UNITS, ending_of, list_allowed_units
 from workbench.imports.number_notation import is_numeral, number
 from workbench.imports.sample_rows import Samples
 
@@ -155,7 +164,7 @@ def _numbers(path: Path, samples: Samples, source: Source, decimal: str) -> tupl
 
 
 def _scale(raw: Column, source: Source, unit: str, scale: Scale, *, turned: bool) -> Column:
-    """Return numbers of one unit in SI; see `export_units`."""
+    """Return numbers of one unit in SI; see `cell_units`."""
     ending, (stroke_m, range_pa) = ending_of(source.name), scale
     if ending == "_m" and (unit in SHARES or turned) and stroke_m is None:
         said = f"-{unit}" if turned else unit

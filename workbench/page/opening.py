@@ -10,9 +10,9 @@ from config.plausibility import oddities
 from config.recording import Recording
 from workbench.compare.comparison_sentences import shorten_notes
 from workbench.data.record import Record, ready, require_few_samples
+from workbench.imports.cell_units import SHARES
 from workbench.imports.column_mapping import RANGE_PA, ExportOptions, list_units, read_mapping, read_status
 from workbench.imports.export_preview import ExportPreview, preview
-from workbench.imports.export_units import SHARES
 from workbench.imports.historian_export import read_export
 from workbench.imports.own_format import own_recording
 
@@ -108,7 +108,7 @@ class Opened:
 def split_column(ours: str, theirs: str) -> tuple[str, str]:
     """Return the name and the unit of a column as `NAME:UNIT` says it; the unit is empty where it says none.
 
-    >>> parted("position_m", "FIC:101.PV:%"), parted("time_s", "FIC:101")
+    >>> split_column("position_m", "FIC:101.PV:%"), split_column("time_s", "FIC:101")
     (('FIC:101.PV', '%'), ('FIC:101', ''))
     """
     name, _, unit = theirs.rpartition(":")

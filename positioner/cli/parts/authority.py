@@ -13,7 +13,7 @@ from cryptography.hazmat.primitives.asymmetric import ec
 from cryptography.x509.oid import ExtendedKeyUsageOID, NameOID
 
 from config.roles import Role
-from fieldbus.modbus.tls import ROLE_OID, role_extension
+from fieldbus.modbus.client_roles import ROLE_OID, role_extension
 
 CLOCKS_DIFFER = timedelta(hours=1)
 """A certificate is valid this much before it is made: the clocks of its readers may be slow."""

@@ -1,4 +1,4 @@
-"""Units of exports, by all the names that people give them, and what they are in SI.
+"""Units of cells and headers, by all the names that people give them, and what they are in SI.
 
     SI = factor raw + offset
 
@@ -11,6 +11,8 @@ and FILETIME, `ud` millionths of a day.
 import re
 from collections.abc import Mapping
 from math import pi
+
+from workbench.imports.number_notation import is_numeral
 
 UNITS: Mapping[str, Mapping[str, float]] = {
     "_s": {
@@ -68,6 +70,7 @@ PROCESS_UNITS = re.compile(
 )
 """Of a flow, a temperature and the like, of which no column of ours is."""
 SI = {ending: next(unit for unit, factor in units.items() if factor == 1.0) for ending, units in UNITS.items()}
+_WITH_UNIT = re.compile(r"([+\u2212-]?[\d.,]+(?:[eE][+-]?\d+)?)\s*([^\d\s].*)")
 _ALIASES = {
     "sec secs second seconds sek sekunde sekunden": "s",
     "msec millisec milliseconds millisekunden": "ms",
@@ -143,6 +146,28 @@ def unit_in_header(name: str) -> tuple[str, str | None]:
     )
     unit = unit_named(match[2] or match[3] or match[4]) if match else None
     return (match[1].rstrip(), unit) if match and unit else (name, None)
+
+
+def split_unit(cell: str) -> tuple[str, str | None]:
+    """Return the numeral of a cell and the unit behind it, in our spelling; None where none stands there.
+
+    >>> split_unit("1,02 cm"), split_unit("949 mbar"), split_unit("50.1"), split_unit("12 furlong")
+    (('1,02', 'cm'), ('949', 'mbar'), ('50.1', None), ('12 furlong', None))
+    """
+    match = None if is_numeral(cell) else _WITH_UNIT.fullmatch(cell)
+    unit = unit_named(match[2]) if match else None
+    return (match[1], unit) if match and unit else (cell, None)
+
+
+def with_any_unit(cell: str) -> tuple[str, str]:
+    """Return the numeral of a cell and the unit behind it, ours or a process's; "" where none stands there.
+
+    >>> with_any_unit("12.3 m³/h"), with_any_unit("949 mbar"), with_any_unit("Bad Input")
+    (('12.3', 'm³/h'), ('949', 'mbar'), ('Bad Input', ''))
+    """
+    numeral, unit = split_unit(cell)
+    match = None if unit or is_numeral(cell) else _WITH_UNIT.fullmatch(cell)
+    return (match[1], match[2]) if match and PROCESS_UNITS.fullmatch(match[2]) else (numeral, unit or "")
 
 
 def ending_of(name: str) -> str:
