@@ -8,7 +8,7 @@
 H^-1 is right where the residuals are the noise; the sandwich H^-1 M H^-1 (Huber, White, by clusters) where landings
 scatter by themselves, and every move is but one witness. An interval is z +- t sqrt C, t Student's of n - p degrees of
 freedom. Static friction is what break-aways leave open: its interval reaches over all values whose cost is within 1.92
-of the least, by break-aways alone, and that of what they hang on besides.
+of the least, by break-aways alone, and over that of the curvature, where this determines it.
 
 A combination of parameters whose standard deviation exceeds 1, a factor of e, is not determined.
 """
@@ -33,6 +33,8 @@ NOTHING = 1e-12
 """Of the largest eigenvalue of the scaled information: one that is none."""
 FARTHEST = 8.0
 """Of a logarithm, beyond which a deviation is open."""
+UNDETERMINED = 1.0
+"""Standard deviation of a logarithm from which on the curvature does not determine it."""
 INVOLVED = 0.3
 """Component of a unit vector from which a parameter is named as part of a combination."""
 TOLD = 0.1
@@ -102,9 +104,9 @@ def uncertainty(like: Likelihood, end: End) -> Uncertainty:
     for i, each in enumerate(like.parameters):
         if each.index == STATIC:
             low, high = _static_interval(like, end, i)
-            lower[i] = min(lower[i] if np.isfinite(lower[i]) else low, low)
-            upper[i] = max(upper[i] if np.isfinite(upper[i]) else high, high)
-            std[i] = max(std[i] if std[i] < FARTHEST else 0.0, 0.25 * (high - low))
+            determined = std[i] < UNDETERMINED
+            lower[i], upper[i] = (min(lower[i], low), max(upper[i], high)) if determined else (low, high)
+            std[i] = max(std[i] if determined else 0.0, 0.25 * (high - low))
     least = values[known].min() if known.any() else 0.0
     condition = float(np.sqrt(values[-1] / least)) if least > 0.0 else float("inf")
     open_ones = _open_combinations(like, H[:count, :count], scale[:count])
@@ -143,7 +145,7 @@ def _open_combinations(like: Likelihood, H: Vector, scale: Vector) -> tuple[Comb
     values, vectors = np.linalg.eigh(information)
     found = []
     for value, vector in zip(values, vectors.T, strict=True):
-        if value > 1.0:
+        if value > UNDETERMINED**-2:
             continue
         order = np.argsort(-np.abs(vector))
         involved = [i for i in order if abs(vector[i]) > INVOLVED]
