@@ -15,6 +15,9 @@ none, by weighted least squares:
 
     p_s(x, r) = p_s(x) + t_s r          s = +1 up, -1 down
 
+Where the stem sticks and slips, its line is between those of sliding and of static friction: by how much its scatter
+tells (`Line.slip_pa`), and each figure is known no better.
+
 p command, Pa; x position, m; r rate, Pa/s.
 """
 
@@ -74,6 +77,17 @@ class Line:
         return self.leg.rate_pa_per_s * float(np.median(np.diff(self.leg.time_s)))
 
     @property
+    def slip_pa(self) -> float:
+        """How far a stem that sticks and slips lies behind where it would slide, in the mean, Pa.
+
+        A sawtooth of height A scatters by A / sqrt(12) beyond the noise, and its mean is A / 2 off its tips. The noise
+        is what neighbours differ by.
+        """
+        steps_m = np.diff(self.leg.position_m)
+        by_chance = 1.0 + THRESHOLDS.scatter_by_chance / sqrt(len(steps_m))
+        return sqrt(3.0 * max(self.residual_m**2 - 0.5 * by_chance * float(np.var(steps_m)), 0.0)) / self.slope
+
+    @property
     def slope_std(self) -> float:
         """Standard deviation of the slope, m/Pa."""
         return sqrt(self.covariance[0][0])
@@ -107,7 +121,7 @@ class Ramps:
         matrix = np.column_stack([np.ones(len(rates)), rates]) * weights[:, None]
         solved = np.linalg.lstsq(matrix, pressures * weights)[0]
         covariance = np.linalg.inv(matrix.T @ matrix)
-        return Figure(float(solved[0]), THRESHOLDS.sigmas * sqrt(float(covariance[0, 0])))
+        return Figure(float(solved[0]), THRESHOLDS.sigmas * hypot(sqrt(float(covariance[0, 0])), self._slip_pa(way)))
 
     def at_slowest(self, way: int, position_m: float) -> Figure:
         """Return the same at the slowest rate that was played, lag and all, Pa."""
@@ -117,7 +131,7 @@ class Ramps:
         slow = [n for n, rate in enumerate(rates) if rate < (1.0 + THRESHOLDS.same_rate) * min(rates)]
         weights = 1.0 / deviations[slow] ** 2
         mean = float(np.sum(weights * pressures[slow]) / np.sum(weights))
-        return Figure(mean, THRESHOLDS.sigmas / sqrt(float(np.sum(weights))))
+        return Figure(mean, THRESHOLDS.sigmas * hypot(1.0 / sqrt(float(np.sum(weights))), self._slip_pa(way)))
 
     @property
     def rates_pa_per_s(self) -> tuple[float, ...]:
@@ -135,6 +149,10 @@ class Ramps:
             return []
         limit = (1.0 + THRESHOLDS.same_rate) * min(each.leg.rate_pa_per_s for each in lines)
         return [each for each in lines if each.leg.rate_pa_per_s < limit]
+
+    def _slip_pa(self, way: int) -> float:
+        """Return by how much the lines of one direction are off for slips, Pa: all of them the same way."""
+        return float(np.median([each.slip_pa for each in self.lines if each.leg.way == way]))
 
     def _at(self, way: int, position_m: float) -> tuple[list[float], Column, Column]:
         lines = [each for each in self.lines if each.leg.way == way]

@@ -48,6 +48,8 @@ class Thresholds:
     """Of a leg, in which the position is averaged for the first guess."""
     passes: int = 6
     """Of the choice of rows: each takes them by the line before; the fourth changes nothing any more."""
+    scatter_by_chance: float = 5.2
+    """Share of the noise's variance, over the root of its samples, by which a line's scatter is more: 3 sqrt(3)."""
     parallel_sigmas: float = 3.0
     """Deviations of a line's slope within which it is the spring's: of six lines of one slope, one in 60 times one lies
     beyond; at two deviations, one time in four."""
