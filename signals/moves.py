@@ -127,9 +127,9 @@ def moves(position_m: Array, noise_m: float) -> tuple[Move, ...]:
     edges = np.flatnonzero(np.diff(np.concatenate([[False], steps, [False]])))
     runs = [(int(first), int(end)) for first, end in zip(edges[::2], edges[1::2], strict=True)]
     # Steps first .. end - 1 move: samples `first` and `end` are the last and the next at rest.
-    apart = _joined(runs, lambda one, other: not _rests_between(x, noise_m, one, other, _about))
+    apart = _joined(runs, lambda one, other: not _rests_between(x, noise_m, one, other, ((one[0], other[1]),)))
     shown = [run for run in apart if _covers(x, noise_m, run)]
-    apart = _joined(shown, lambda one, other: not _rests_between(x, noise_m, one, other, _slower))
+    apart = _joined(shown, lambda one, other: not _rests_between(x, noise_m, one, other, (one, other)))
     return tuple(_fitted(x, noise_m, apart))
 
 
@@ -250,22 +250,9 @@ def _speed(x: Array, run: Run) -> float:
     return float(np.ptp(x[run[0] : run[1] + 1])) / (run[1] - run[0])
 
 
-def _turns(x: Array, one: Run, other: Run) -> bool:
-    return bool((x[one[1]] - x[one[0]]) * (x[other[1]] - x[other[0]]) < 0.0)
-
-
-def _about(x: Array, one: Run, other: Run) -> float:
-    """Return how fast the stem goes, m a sample, with what is between; where it turns, in the faster move."""
-    return max(_speed(x, one), _speed(x, other)) if _turns(x, one, other) else _speed(x, (one[0], other[1]))
-
-
-def _slower(x: Array, one: Run, other: Run) -> float:
-    """Return how fast the slower of two moves goes, m a sample; where the stem turns, the faster."""
-    return _about(x, one, other) if _turns(x, one, other) else min(_speed(x, one), _speed(x, other))
-
-
-def _rests_between(x: Array, noise_m: float, one: Run, other: Run, going: Callable[[Array, Run, Run], float]) -> bool:
-    """Return whether the samples between two moves show a rest, against how fast the stem goes beside it."""
+def _rests_between(x: Array, noise_m: float, one: Run, other: Run, beside: tuple[Run, ...]) -> bool:
+    """Return whether the samples between two moves show a rest, against the slowest run beside it; where the stem turns
+    there, against the faster move."""
     first, last = one[1], other[0]
     count = last - first + 1
     if count < FEWEST_REST_SAMPLES:
@@ -273,7 +260,8 @@ def _rests_between(x: Array, noise_m: float, one: Run, other: Run, going: Callab
     rows = np.arange(count) - 0.5 * (count - 1)
     square = float(rows @ rows)
     slope = float(rows @ x[first : last + 1]) / square
-    speed = going(x, one, other)
+    turns = (x[one[1]] - x[one[0]]) * (x[other[1]] - x[other[0]]) < 0.0
+    speed = max(_speed(x, one), _speed(x, other)) if turns else min(_speed(x, each) for each in beside)
     return bool(abs(slope) + SURELY * noise_m / np.sqrt(square) < SLOWER * speed)
 
 
