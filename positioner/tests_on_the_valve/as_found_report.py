@@ -20,7 +20,17 @@ import numpy as np
 
 from config.daemon_file import DaemonFile
 from config.results.block import Table, as_text
-from positioner.tests_on_the_valve.kept_records import AT_ITS_RATE, KINDS, MEANS, Change, Record, change_table, changes
+from positioner.response.figure import Figure
+from positioner.tests_on_the_valve.kept_records import (
+    AT_ITS_RATE,
+    KINDS,
+    MEANS,
+    Change,
+    Record,
+    change_table,
+    changes,
+    span_of,
+)
 from positioner.tests_on_the_valve.outcome import Curve, Picture, Quantity
 from positioner.tests_on_the_valve.thresholds import THRESHOLDS
 
@@ -28,7 +38,10 @@ if TYPE_CHECKING:
     from pathlib import Path
 
 TITLES = {"factory": "factory", "as_found": "as found", "as_left": "as left"}
-MARK = f"* off what is recommended, by more than {THRESHOLDS.off:.0%} and by more than its own ±"
+MARK = (
+    f"* off what is recommended by more than {THRESHOLDS.off:.0%} (an end: {THRESHOLDS.worth_of_span:.0%} of the "
+    f"travel or bench set's span), and by more than {THRESHOLDS.changed_sigmas:.0f} standard deviations"
+)
 WIDTH, HEIGHT, EDGE = 640, 300, 56
 """Of a picture, in its own units."""
 INKS = {"as_found": ("#d9622b", "#e8a27f"), "as_left": ("#1b7f79", "#7db8b4"), "factory": ("#5b6675", "#9aa4b1")}
@@ -93,7 +106,9 @@ class ValveReport:
         for name in names:
             told = [figures.get(name) for figures in by_kind.values()]
             first = next(each for each in told if each is not None)
-            rows.append((first.text, self._recommended(first), *(self._shown(each) for each in told)))
+            shown = (self._shown(each, record) for each, record in zip(told, kept.values(), strict=True))
+            recommended = replace(first, expected=self._recommended(first).value).shown_expected
+            rows.append((first.text, recommended, *shown))
         verdicts = ("verdict", "", *(record.outcome.said for record in kept.values()))
         return Table(("figure", "recommended ", *(f"{TITLES[kind]} " for kind in kept)), [verdicts, *rows], test)
 
@@ -126,31 +141,27 @@ class ValveReport:
                             shown.setdefault(f"{TITLES[after.kind]}: {each.means}", []).append(f"{test}: {told}")
         return [f"{means} ({'; '.join(figures)})" for means, figures in shown.items()]
 
-    def _value(self, quantity: Quantity) -> float | None:
-        told = {**self.by_file, **self._factory, **self.recommended}
-        return told.get(quantity.name, quantity.expected)
+    def _recommended(self, quantity: Quantity) -> Figure:
+        """Return what a figure should be; without a value where nobody says."""
+        if quantity.name in self._factory.keys() - self.recommended.keys():
+            return self._factory[quantity.name]
+        return Figure({**self.by_file, **self.recommended}.get(quantity.name, quantity.expected))
 
     @property
-    def _factory(self) -> dict[str, float]:
+    def _factory(self) -> dict[str, Figure]:
         """What the factory's newest records say of what a technician looks at, by name."""
         left = [each.outcome for each in self.records if each.kind == "factory"]
-        told = {each.name: each.figure.value for outcome in left for each in outcome.quantities}
+        told = {each.name: each.figure for outcome in left for each in outcome.quantities}
         looked_at = (MEANS.keys() | self.by_file.keys()) - AT_ITS_RATE
-        return {name: value for name, value in told.items() if name in looked_at and value is not None}
+        return {name: figure for name, figure in told.items() if name in looked_at and figure.value is not None}
 
-    def _shown(self, quantity: Quantity | None) -> str:
+    def _shown(self, quantity: Quantity | None, record: Record) -> str:
         """Return a figure as it is shown, marked where it is off what is recommended."""
         if quantity is None:
             return "-"
-        wanted, figure = self._value(quantity), quantity.figure
-        if wanted is None or figure.value is None:
-            return quantity.shown
-        off = abs(figure.value - wanted)
-        marked = off > THRESHOLDS.off * abs(wanted) and off > (figure.plus_minus or 0.0)
+        wanted = replace(quantity, figure=self._recommended(quantity))
+        marked = Change(quantity, wanted, span_of(quantity.name, record.outcome)).is_off_by(THRESHOLDS.off)
         return f"{quantity.shown} *" if marked else quantity.shown
-
-    def _recommended(self, quantity: Quantity) -> str:
-        return replace(quantity, expected=self._value(quantity)).shown_expected
 
 
 def recommended_by(file: DaemonFile) -> dict[str, float]:

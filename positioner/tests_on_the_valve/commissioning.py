@@ -137,7 +137,7 @@ def _commissioned(valve: Watching, name: str, bounds: Bounds, show: Callable[[st
     opening, closing = (up_s, down_s) if sign > 0 else (down_s, up_s)
     closed_m = low.value if sign > 0 else -high.value
     adequate, notes = _supply(found, bounds)
-    if abs(closed_m) > THRESHOLDS.zero_off * travel.value:
+    if abs(closed_m) > THRESHOLDS.worth_of_span * travel.value:
         notes.append(
             f"the reading at the closed end is {kind.length.said(closed_m)}: its zero is off, set it in the device"
         )

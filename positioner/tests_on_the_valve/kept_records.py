@@ -6,13 +6,15 @@ A record is one JSON file, `STAMP_TEST.json`, in a folder of the valve's own: ou
 A figure has changed where it is off by more than `changed_sigmas` of both deviations together and by `worth` of itself:
 
     d = (now - before) / sqrt(s_now^2 + s_before^2)      s half of each +-
+
+A place on the travel, or a command, is counted from a zero that means nothing: `worth_of_span` of what they span.
 """
 
 import json
 from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass
 from datetime import UTC, datetime
-from math import hypot, inf
+from math import hypot, inf, prod
 from pathlib import Path
 from typing import Any
 
@@ -39,6 +41,11 @@ RATE = "rate_pa_per_s"
 """The figure that says how fast the slowest ramp was."""
 AT_ITS_RATE = frozenset({"friction_at_rate_pa", "lag_pa", "dynamic_error_band", "dynamic_error_band_mean"})
 """Figures that hold for a ramp of their own rate: compared with those of such a one alone."""
+PLACES = {
+    **dict.fromkeys(("low_m", "high_m", "closed_m"), ("travel_m",)),
+    **dict.fromkeys(("bench_low_pa", "bench_high_pa", "opens_at_pa", "closes_at_pa"), ("travel_m", "spring_pa_per_m")),
+}
+"""Figures that are places, and the figures whose product is what they span."""
 OF_ITS_START = frozenset({"command_pa", "start_m", "breakout_pa", "breakout_s", "back_m"})
 """Figures of where a test began, and of which way the stem had come there: compared with none."""
 MEANS: Mapping[str, tuple[str, str]] = {
@@ -69,21 +76,36 @@ MEANS: Mapping[str, tuple[str, str]] = {
 
 @dataclass(frozen=True, slots=True)
 class Change:
-    """A figure then and now, and by how many deviations it is off."""
+    """A figure then and now; of a place, what such places span."""
 
     quantity: Quantity
     before: Quantity
-    deviations: float
+    span: float | None = None
+
+    @property
+    def deviations(self) -> float:
+        """By how many deviations of both it is off."""
+        now, before = self.quantity.figure, self.before.figure
+        if now.value is None or before.value is None:
+            return 0.0
+        std = 0.5 * hypot(now.plus_minus or 0.0, before.plus_minus or 0.0)
+        off = now.value - before.value
+        return off / std if std > 0.0 else (0.0 if off == 0.0 else inf * off)
 
     @property
     def changed(self) -> bool:
-        """Whether it is off by more than both uncertainties, and by what is worth a look."""
+        """Whether it is off by what is worth a look, or is known of one of both alone."""
         now, before = self.quantity.figure.value, self.before.figure.value
-        if now is None or before is None:
-            return now is not before
-        return abs(self.deviations) > THRESHOLDS.changed_sigmas and abs(now - before) > THRESHOLDS.worth * max(
-            abs(now), abs(before)
-        )
+        return now is not before if now is None or before is None else self.is_off_by(THRESHOLDS.worth)
+
+    def is_off_by(self, share: float) -> bool:
+        """Whether it is off by more than both uncertainties, and by more than a share of itself; false without one."""
+        now, before = self.quantity.figure.value, self.before.figure.value
+        if now is None or before is None or abs(self.deviations) <= THRESHOLDS.changed_sigmas:
+            return False
+        if self.span is not None:
+            return abs(now - before) > THRESHOLDS.worth_of_span * self.span
+        return abs(now - before) > share * max(abs(now), abs(before))
 
     @property
     def means(self) -> str:
@@ -162,12 +184,20 @@ def baseline(folder: Path, test: str, against: str | None) -> Record | None:
 
 
 def changes(now: Outcome, before: Outcome) -> list[Change]:
-    """Return the figures of both, how far each is off; one without a +- can be compared with nothing."""
+    """Return the figures of both; one without a +- can be compared with nothing."""
     then = {each.name: each for each in before.quantities}
     apart = OF_ITS_START | (AT_ITS_RATE if _rates_differ(now, before) else frozenset())
     both = [(each, then[each.name]) for each in now.quantities if each.name in then.keys() - apart]
     told = [pair for pair in both if all(each.figure.value is None or each.figure.plus_minus for each in pair)]
-    return [Change(each, was, _deviations(each.figure, was.figure)) for each, was in told]
+    return [Change(each, was, span_of(each.name, now)) for each, was in told]
+
+
+def span_of(name: str, outcome: Outcome) -> float | None:
+    """Return what places of a figure's kind span in an outcome; None of a figure that is none, or where it lacks."""
+    known = {each.name: each.figure.value for each in outcome.quantities}
+    factors = PLACES.get(name, ())
+    told = [value for each in factors if (value := known.get(each)) is not None]
+    return prod(told) if told and len(told) == len(factors) else None
 
 
 def _rates_differ(*outcomes: Outcome) -> bool:
@@ -206,14 +236,6 @@ def trend(told: Sequence[Record], names: Sequence[str]) -> Table:
         rows.append((f"{when:%Y-%m-%d %H:%M}", record.outcome.said, record.kind.replace("_", " "), *cells))
     headings = ("UTC", "", "", *(texts.get(each, each) + " " for each in names))
     return Table(headings, rows, f"the last {len(shown)} of {len(told)}")
-
-
-def _deviations(now: Figure, before: Figure) -> float:
-    if now.value is None or before.value is None:
-        return 0.0
-    std = 0.5 * hypot(now.plus_minus or 0.0, before.plus_minus or 0.0)
-    off = now.value - before.value
-    return off / std if std > 0.0 else (0.0 if off == 0.0 else inf * off)
 
 
 def _kept_curve(curve: Curve) -> dict[str, object]:

@@ -13,8 +13,11 @@ class Thresholds:
     """Deviations: of twenty figures one in a thousand comparisons is off by so much without a change."""
     worth: float = 0.02
     """Of a figure: less than this is no change that anybody acts on, however certain."""
+    worth_of_span: float = 0.01
+    """Of the travel, or of the bench set's span: the same of an end, which has no zero of its own. A reading at the
+    closed end that is farther from 0 is off."""
     off: float = 0.05
-    """Of what is recommended: a figure that is farther from it, and farther than its own +-, is marked."""
+    """Of what is recommended: a figure that is farther from it, for certain, is marked."""
 
     fewest_at_rest: int = 8
     """Samples of a rest: a slope and its scatter need some."""
@@ -137,8 +140,6 @@ class Thresholds:
     """Of the same: with less the supply is hardly enough."""
     rounded_pa: float = 1000.0
     """A limit of the pressure is given in whole kPa."""
-    zero_off: float = 0.01
-    """Of the travel: a reading at the closed end that is farther from 0 is off."""
 
 
 THRESHOLDS = Thresholds()

@@ -147,6 +147,33 @@ def test_the_factorys_record_is_recommended_before_what_the_file_was_commissione
     assert opens[1:] == ("1.1 s", "1.100 ± 0.050 s", "1.100 ± 0.050 s")
 
 
+@pytest.mark.parametrize(
+    ("name", "now", "factory", "marked", "means"),
+    [
+        ("low_m", Figure(-9.8e-6, 2e-6), Figure(0.0, 1e-6), False, False),
+        ("low_m", Figure(6e-4, 1e-4), Figure(0.0, 1e-5), True, True),
+        ("low_m", Figure(6e-4, 5e-4), Figure(0.0, 1e-5), False, False),
+        ("bench_low_pa", Figure(150.0, 10.0), Figure(0.0, 10.0), False, False),
+        ("bench_low_pa", Figure(2000.0, 200.0), Figure(500.0, 200.0), True, True),
+        ("friction_pa", Figure(6300.0, 50.0), Figure(6000.0, 10.0), False, True),
+        ("friction_pa", Figure(6600.0, 50.0), Figure(6000.0, 400.0), False, False),
+        ("friction_pa", Figure(6600.0, 50.0), Figure(6000.0, 10.0), True, True),
+    ],
+)
+def test_a_place_is_held_against_what_its_kind_spans_and_every_figure_against_both_uncertainties(
+    tmp_path: Path, name: str, now: Figure, factory: Figure, marked: bool, means: bool
+) -> None:
+    """A lower end of -0.01 mm in 40 mm is no other end than 0; nor is a figure that the factory's left open."""
+    spans = Quantity("travel_m", "", "m", Figure(0.04, 1e-5)), Quantity("spring_pa_per_m", "", "Pa/m", Figure(2e6, 1e3))
+    for kind, figure in (("factory", factory), ("as_found", now)):
+        outcome = Outcome("signature", "FV-1", (Quantity(name, "it", "m", figure), *spans), (ValveTestVerdict.PASSED,))
+        keep(tmp_path, outcome, kind, 1e9 if kind == "factory" else 2e9, {})
+    report = ValveReport("FV-1", records(tmp_path))
+    (row,) = (row for row in report.table("signature").rows if row[0] == "it")
+    assert [cell.endswith("*") for cell in row[2:]] == [marked, False]
+    assert bool(report.findings()) is means
+
+
 def test_what_the_file_says_is_recommended() -> None:
     assert recommended_by(daemon_file(law=LAW)) == {
         "travel_m": STROKE_M,

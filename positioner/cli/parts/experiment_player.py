@@ -24,7 +24,8 @@ RECORDED_WITHIN_S, BROKEN_OFF_WITHIN_S = 30.0, 5.0
 PLAY_POLL_S = 0.3
 LATEST_FILES = 2
 """Of the recorder, in which an experiment may lie."""
-HELD_CYCLES = 1.5  # a register holds so long that no cycle misses it
+TRIED_BEGINS = 200
+"""Places of a recording at which a sequence may begin."""
 SAME_PRESSURE_SHARE, LEAST_PLAYED_SHARE = 0.01, 0.95
 """Of the sequence's pressures, and of its length: farther from them, or for less, a recording is of something else."""
 
@@ -123,20 +124,15 @@ class RunningValve:
 def player_on(file: "DaemonFile", arguments: argparse.Namespace) -> "Player":
     """Return what plays experiments on the daemon's valve."""
     from config.codes import ExperimentState
+    from positioner.tests_on_the_valve.program import Program
     from workbench.discriminate.discrimination import Played
 
-    folder = _folder(file, arguments)
+    valve = RunningValve(file, arguments)
 
     def play(chosen: "DesignedExperiment") -> Played:
-        points = chosen.course.points()
-        within_s = 2.0 * file.experiment.limit_s + RECORDED_WITHIN_S
-        before = last_excited(folder, file.valve.name)
-        with _dcs(arguments) as dcs:
-            state = dcs.play(points, within_s)
-            if state is not ExperimentState.COMPLETE:
-                return Played(None, why_not(state, dcs))
-        recording = read_experiment_rows(folder, file.valve.name, points, before)
-        return Played(recording, "" if recording else f"what is recorded in {folder} is not the whole of it")
+        played = valve.play(Program("experiment", chosen.course.points()))
+        whole = played.state is ExperimentState.COMPLETE
+        return Played(played.recording if whole else None, played.problem)
 
     return play
 
@@ -154,7 +150,7 @@ def read_experiment_rows(
     valve: str,
     points: tuple[tuple[float, float], ...],
     before: Recording | None,
-    within_s: float = RECORDED_WITHIN_S,
+    within_s: float,
 ) -> Recording | None:
     """Return the rows of the experiment that has just ended, once the recorder has written them; None if it does not.
 
@@ -196,25 +192,29 @@ def last_excited(folder: Path, valve: str) -> Recording | None:
 
 
 def is_of(recording: Recording, points: tuple[tuple[float, float], ...]) -> bool:
-    """Whether a recording's commands go through a sequence, wherever in it that begins."""
+    """Whether a recording's commands go through a sequence, wherever in it that begins.
+
+    A sample's command was decided in the cycle that ended with it, however late that was: it is what the sequence asks
+    for at some time of that cycle.
+    """
     import numpy as np
 
     at_s, levels_pa = np.array(points).T
     time_s = recording.time_s - recording.time_s[0]
+    command_pa = recording.command_pa[1:]
     # The last rows may be missing where cycles were late: what of the sequence is not recorded is not the same.
-    latest_s = max(0.0, float(time_s[-1] - at_s[-1]))
-    wanted_s = np.linspace(0.0, at_s[-1], 400)
-    wanted_pa = np.interp(wanted_s, at_s, levels_pa)
-    span_pa = max(float(np.ptp(levels_pa)), 1.0)
-    # Between two samples the command is held: it is where it was to be then, by a cycle and a half at the most.
-    held_s = HELD_CYCLES * float(np.median(np.diff(time_s)))
-    allowed_pa = SAME_PRESSURE_SHARE * span_pa + held_s * np.abs(np.gradient(wanted_pa, wanted_s))
+    begins_s = np.linspace(0.0, max(0.0, float(time_s[-1] - at_s[-1])), TRIED_BEGINS)
+    between_s = 0.5 * float(begins_s[1] - begins_s[0])
+    rounding_pa = SAME_PRESSURE_SHARE * max(float(np.ptp(levels_pa)), 1.0)
 
     def share(begin_s: float) -> float:
-        apart_pa = np.abs(np.interp(begin_s + wanted_s, time_s, recording.command_pa) - wanted_pa)
-        return float(np.mean((apart_pa < allowed_pa) & (begin_s + wanted_s <= time_s[-1])))
+        cycles_s = time_s[:-1] - begin_s - between_s, time_s[1:] - begin_s + between_s
+        first_pa, last_pa = (np.interp(each, at_s, levels_pa) for each in cycles_s)
+        low_pa, high_pa = np.minimum(first_pa, last_pa) - rounding_pa, np.maximum(first_pa, last_pa) + rounding_pa
+        lasted_s = np.diff(np.clip(time_s - begin_s, 0.0, at_s[-1]))
+        return float(np.sum(lasted_s[(low_pa <= command_pa) & (command_pa <= high_pa)]) / at_s[-1])
 
-    return any(share(begin_s) > LEAST_PLAYED_SHARE for begin_s in np.linspace(0.0, latest_s, 200).tolist())
+    return any(share(begin_s) > LEAST_PLAYED_SHARE for begin_s in begins_s.tolist())
 
 
 def _read(path: Path) -> Recording | None:
