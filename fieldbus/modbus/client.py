@@ -127,7 +127,7 @@ class ModbusClient:
         """Return the PDU that answers what was asked; None while it is not whole. Waits for nothing.
 
         Args:
-            late: whether the time-out is over.
+            late: whether the time-out is over. What came meanwhile counts: the caller may be late, not the device.
 
         Raises:
             ClientError: as `transact`.
@@ -137,9 +137,13 @@ class ModbusClient:
             raise NotConnected(CLOSED)
         try:
             if late:
-                raise TimeoutError
+                line.settimeout(0.0)
             self._received += _some(line)
             found = self._framing.reply(self._received)
+            if late:
+                if found is None:
+                    raise TimeoutError
+                line.settimeout(self._timeout_s)
         except (OSError, UnexpectedReply) as error:
             raise self._ended_by(error) from None
         if found is None:
@@ -153,7 +157,7 @@ class ModbusClient:
         self.close()
         if isinstance(error, UnexpectedReply):
             return error
-        if isinstance(error, TimeoutError):
+        if isinstance(error, TimeoutError | BlockingIOError):
             return ReplyTimeout(f"no reply within {1e3 * self._timeout_s:g} ms")
         return NotConnected(failure_reason(error) if isinstance(error, ssl.SSLError) else CLOSED)
 

@@ -11,7 +11,7 @@ from contextlib import ExitStack
 from dataclasses import dataclass
 from functools import partial
 from pathlib import Path
-from threading import Event, Semaphore, Thread
+from threading import Event, Thread
 
 from config.codes import EventKind
 from config.daemon_file import DaemonFile
@@ -26,7 +26,7 @@ from positioner.control.requests import Requests
 from positioner.control.settings import Settings
 from positioner.control.travel.signal_path import SignalPath
 from positioner.daemon.alarms.alarm_list import AlarmList
-from positioner.daemon.backoff import AT_A_TIME
+from positioner.daemon.backoff import Doors
 from positioner.daemon.cycle import Cycle, run_in_turn
 from positioner.daemon.cycles_together import SLOT_S, CyclesTogether
 from positioner.daemon.ending import Endings
@@ -152,12 +152,12 @@ class AssembledValves:
 
     def __init__(self, share: Share, counts: RequestCounts, history: HistoryKeeper, on_exit: ExitStack) -> None:
         self._on_exit = on_exit
-        refinement, door = RefinementProcess(), Semaphore(AT_A_TIME)
+        refinement, doors = RefinementProcess(), Doors()
         on_exit.callback(refinement.stop)
         is_alone = share.is_whole and len(share.files) == 1
         paced = zip(share.files, share.extended, _paces(share.files, is_alone=is_alone), strict=True)
         self._valves = [
-            _assembled(file, valve, pace, share.source, is_alone, on_exit, refinement, door, history)
+            _assembled(file, valve, pace, share.source, is_alone, on_exit, refinement, doors, history)
             for file, valve, pace in paced
         ]
         self._lines = [[self._valves[each] for each in line] for line in share.lines]
@@ -233,14 +233,14 @@ def _assembled(
     is_alone: bool,
     on_exit: ExitStack,
     refinement: RefinementProcess,
-    door: Semaphore,
+    doors: Doors,
     history: HistoryKeeper,
 ) -> ServedValve:
     keep_alone(file, source.parent, on_exit)
     settings = Settings.of(file, extended)
     link_settings = LinkSettings.of(file, settings.limits.restart_tolerance_pa)
     device = file.device.read_only() if file.cycle.shadow else file.device
-    link = Link(driver_for(device), pace, link_settings, door)
+    link = Link(driver_for(device), pace, link_settings, doors)
     on_exit.callback(link.release)
     where = str(source) if is_alone else f"{source}: valve {file.valve.name}"
     unreachable_reason = None

@@ -10,6 +10,7 @@ of failure is said once and then counted, and so are the lines that one host cau
 
 import math
 from collections.abc import Hashable
+from threading import Semaphore
 
 from fieldbus.modbus.admission import Allowance
 
@@ -79,6 +80,16 @@ class Sayings:
             self._said.pop(next(iter(self._said)))
         self._said[kind] = now_s, 0
         return passed
+
+
+class Doors:
+    """What devices are connected to through, so many at a time: those that are away, and those that just lost a reply.
+
+    Who waits behind those that are away is soon away, too: one lost reply would be a fault where other devices are.
+    """
+
+    def __init__(self, at_a_time: int = AT_A_TIME) -> None:
+        self.away, self.lost_a_reply = Semaphore(at_a_time), Semaphore(at_a_time)
 
 
 class LinesPerPeer:

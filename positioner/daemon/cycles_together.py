@@ -23,8 +23,8 @@ from positioner.daemon.backoff import AT_A_TIME
 from positioner.daemon.cycle import Cycle
 from positioner.daemon.pacing import RealTimePace, raise_priority
 
-HELPERS = 2 * AT_A_TIME
-"""Of these only so many connect at a time: the others are there for what is read back."""
+HELPERS = 3 * AT_A_TIME
+"""Through each of the two doors so many connect at a time: the others are there for what is read back."""
 SELECTS_S = 1e-3
 """The grain of waiting for descriptors; a shorter wait is slept, and answers are taken after it."""
 SLOT_S = 2.5e-3

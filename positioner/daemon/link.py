@@ -37,7 +37,7 @@ from drivers.boundary import (
     Refused,
 )
 from positioner.control.sample import Sample, sample_of
-from positioner.daemon.backoff import Backoff, Sayings
+from positioner.daemon.backoff import Backoff, Doors, Sayings
 from positioner.daemon.logs import log_event
 from positioner.daemon.pacing import Pace
 
@@ -119,11 +119,11 @@ class Link:
         driver: of the device.
         pace: says what time it is.
         settings: how the device is attended to.
-        door: of all that connect anew; who finds it closed tries with the next cycle. None: nobody else does.
+        doors: of all that connect anew; who finds its own closed tries with the next cycle. None: its own.
     """
 
     def __init__(
-        self, driver: Driver, pace: Pace, settings: LinkSettings | None = None, door: Semaphore | None = None
+        self, driver: Driver, pace: Pace, settings: LinkSettings | None = None, doors: Doors | None = None
     ) -> None:
         self.counts = LinkCounts()
         self._driver = driver
@@ -135,7 +135,9 @@ class Link:
         self._before_pa: float | None = None
         self._pace = pace
         self._settings = settings or LinkSettings()
-        self._door = door
+        self._doors = doors or Doors()
+        self._lost_a_reply = False
+        """Whether the device was there until its last reply was lost."""
         self._longest_unattended_s = self._settings.longest_unattended_s
         self._read_back_s = -math.inf
         self._read_backs = 0
@@ -203,12 +205,12 @@ class Link:
                 told_pa, self._told_pa = self._told_pa, None
                 reading = self._driver.read() if self._settings.shadow else self._driver.exchange(command_pa)
                 self._take(reading, command_pa, told_pa)
-            elif (self._unattended_s > 0 or self._backoff.may_try(now_s)) and self._enters():
+            elif (self._unattended_s > 0 or self._backoff.may_try(now_s)) and self._door.acquire(blocking=False):
+                door, self._lost_a_reply = self._door, False
                 try:
                     self._sample = self._found_again()
                 finally:
-                    if self._door is not None:
-                        self._door.release()
+                    door.release()
             else:
                 self._sample = self._lost()
         except DriverError as error:
@@ -300,9 +302,10 @@ class Link:
         """Close the connection."""
         self._driver.close()
 
-    def _enters(self) -> bool:
-        """Return whether the door lets it connect now."""
-        return self._door is None or self._door.acquire(blocking=False)
+    @property
+    def _door(self) -> Semaphore:
+        """Where it waits to connect."""
+        return self._doors.lost_a_reply if self._lost_a_reply else self._doors.away
 
     def _notice_a_stall(self, now_s: float, command_pa: float) -> None:
         """Have a device that was left alone looked at before it is commanded; say so where this daemon stood still."""
@@ -412,7 +415,7 @@ class Link:
             self._refusals += refused
             return
         self._driver.close()
-        self._connected = False
+        self._lost_a_reply, self._connected = self._connected, False
         now_s = awake_s()
         self._backoff.failed(now_s, now_s - self._asked_s)
 

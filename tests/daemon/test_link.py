@@ -1,7 +1,7 @@
 """The link: what becomes of readings and of their absence."""
 
 from dataclasses import replace
-from threading import Event, Semaphore, Thread
+from threading import Event, Thread
 
 import numpy as np
 import pytest
@@ -10,6 +10,7 @@ from config.codes import Quality
 from config.quantities import ActionName, DeviceStatus
 from drivers.boundary import Capabilities, DriverError, NoConnection, NoNumber, NoReply, Reading, Refused
 from positioner.daemon import link as room
+from positioner.daemon.backoff import Doors
 from positioner.daemon.link import Link, LinkSettings
 from positioner.daemon.pacing import DevicePace
 
@@ -262,9 +263,9 @@ class Waiting(Scripted):
 
 
 def test_so_many_connect_at_a_time_and_the_others_with_a_later_cycle() -> None:
-    door = Semaphore(2)
+    doors = Doors(2)
     drivers = [Waiting(reading(1)) for _ in range(5)]
-    links = [Link(driver, DevicePace(), door=door) for driver in drivers]
+    links = [Link(driver, DevicePace(), doors=doors) for driver in drivers]
     first = [Thread(target=link.exchange, args=(5e4,)) for link in links[:2]]
     for thread, driver in zip(first, drivers, strict=False):
         thread.start()
@@ -278,6 +279,20 @@ def test_so_many_connect_at_a_time_and_the_others_with_a_later_cycle() -> None:
         thread.join()
     assert [link.exchange(5e4).quality for link in links[2:]] == [Quality.GOOD] * 3
     assert [driver.opened for driver in drivers] == [1] * 5
+
+
+def test_who_lost_one_reply_does_not_wait_behind_those_that_are_away() -> None:
+    doors = Doors(1)
+    away = Waiting()
+    thread = Thread(target=Link(away, DevicePace(), doors=doors).exchange, args=(5e4,))
+    link = Link(Scripted(NoReply("lost"), reading(2)), DevicePace(), doors=doors)
+    link.open()
+    thread.start()
+    assert away.asked.wait(60.0)
+    qualities = [link.exchange(5e4).quality for _ in range(2)]
+    away.let.set()
+    thread.join()
+    assert qualities == [Quality.LOST, Quality.GOOD]
 
 
 def test_a_stall_is_told_even_where_the_device_is_found_only_later(monkeypatch: pytest.MonkeyPatch) -> None:

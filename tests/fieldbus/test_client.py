@@ -3,6 +3,7 @@
 What the driver makes of faults is in `tests/drivers/test_modbus_faults.py`, the deadline in `test_reply_deadline.py`.
 """
 
+import select
 import socket
 import struct
 import threading
@@ -163,3 +164,23 @@ def test_a_late_reply_is_not_read_after_opening_anew() -> None:
 def test_what_can_be_no_name_of_a_host_is_nobody(host: str) -> None:
     with pytest.raises(NotConnected, match="can be no name of a host"):
         ModbusClient(host, 502, 1, 1.0).open()
+
+
+def test_a_reply_that_came_in_time_is_no_lost_one_to_a_caller_that_looks_late() -> None:
+    """Many valves share a thread that may be held up: the reply waits in the socket, and no time-out takes it away."""
+    with socket.create_server(("127.0.0.1", 0)) as listener:
+        client = ModbusClient("127.0.0.1", listener.getsockname()[1], UNIT, TIMEOUT_S)
+        client.open()
+        line, _ = listener.accept()
+        with line:
+            pdu = bytes.fromhex("03 06 0001 fffe 0003")
+            ready = client.ask(bytes.fromhex("03 000a 0003"))
+            assert ready is not None
+            line.sendall(framed(line.recv(300)[:2], pdu))
+            select.select([ready], [], [], TIMEOUT_S)
+            assert client.answer(late=True) == pdu
+            client.ask(bytes.fromhex("03 000a 0003"))
+            line.sendall(framed(line.recv(300)[:2], pdu)[:-1])
+            select.select([ready], [], [], TIMEOUT_S)
+            with pytest.raises(ReplyTimeout):
+                client.answer(late=True)
