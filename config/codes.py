@@ -52,7 +52,7 @@ class ServiceState(Code):
 
 
 class State(Code):
-    """The states of the seed's control logic (4.1)."""
+    """The states of the paper's control logic (4.1)."""
 
     S0_START = 0, "S0 start"
     S1_UP = 1, "S1 up"
@@ -114,7 +114,7 @@ class InhibitReason(Code):
     LAW_BEYOND_LIMITS = 8, "the law asks for a pressure beyond the limits"
     STUCK = 9, "stuck: the longest slide allowed does not move the stem"
     TRIM_ENDED = 10, "the trim ended outside its dead band"
-    EXCURSION_BEYOND_LIMIT = 11, "a small move needs more overtravel than [control] excursion_limit"
+    EXCURSION_BEYOND_LIMIT = 11, "a small move needs an excursion beyond [control] excursion_limit"
     EXCURSION_WAITS = 12, "a small move waits: the last excursion was too recent"
     STAIRCASE_IN_VAIN = 13, "the staircase of slides gave no static law (see its reason)"
     EXCURSION_BUDGET_SPENT = 14, "a small move waits: the day's travel of the packing is spent"

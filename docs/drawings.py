@@ -66,7 +66,7 @@ def stick_slip(figure_file: Path) -> None:
     peak = max(rows, key=lambda each: each.opening)
     span = ((peak.time_s, 100.0 * peak.reference), (peak.time_s, 100.0 * peak.opening))
     above.annotate("", *span, arrowprops={"arrowstyle": "<->", "color": INK})
-    above.text(peak.time_s + 0.03, 50.0 * (peak.reference + peak.opening), "overtravel", fontsize="small")
+    above.text(peak.time_s + 0.03, 50.0 * (peak.reference + peak.opening), "excursion", fontsize="small")
     above.legend(loc="upper right", fontsize="small")
     above.set_title("A small step of a sticking stem, and the states of the law of slides", fontsize="medium")
     figure.savefig(figure_file, dpi=120)

@@ -70,7 +70,7 @@ def reproduced(out: Path | None, numbers: Path | None, seeds: int) -> int:
 
 
 def _problems(wrong: list[Erratum], refusal: str, found: list[SeedFindings]) -> list[str]:
-    """Return what is not as docs/seed.md says it is."""
+    """Return what is not as docs/paper.md says it is."""
     problems = [
         f"{each.where}, {each.quantity}: as printed {each.printed:g}, corrected {each.corrected:g}, true {each.true:g}"
         for each in wrong

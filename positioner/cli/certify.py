@@ -10,7 +10,7 @@ if TYPE_CHECKING:
     from config.daemon_file import DaemonFile
     from positioner.control.laws.slides.certificate import Certificate, Refused
 
-HELP = "prove bounds of error, overtravel and slides a step for an identified valve; moves nothing"
+HELP = "prove bounds of error, excursion and slides a step for an identified valve; moves nothing"
 EXAMPLE = "positioner certify site.toml"
 
 
@@ -70,5 +70,5 @@ def _lines(file: "DaemonFile", found: "Certificate | Refused") -> list[str]:
         f"{name}: proved for every valve inside the intervals of its identification",
         f"{name}: each move ends, within {100 * found.ends_within_m / stroke_m:.3g} % of the stroke",
         f"{name}: most slides a step {found.most_slides}",
-        f"{name}: greatest overtravel {100 * found.beyond_m / stroke_m:.2f} % of the stroke",
+        f"{name}: longest excursion {100 * found.beyond_m / stroke_m:.2f} % of the stroke",
     ]

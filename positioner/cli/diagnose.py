@@ -40,7 +40,7 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
         "--experiment",
         type=Path,
         metavar="FILE",
-        help="write an input that would show which of the remaining effects it is",
+        help="write an input that would tell equally good effects apart",
     )
     parser.add_argument(
         "-o",
@@ -146,10 +146,10 @@ def _tell_experiment(diagnosis: "Diagnosis", path: Path | None) -> None:
     if diagnosis.experiment is None:
         return
     if path is None:
-        print("--experiment FILE writes an experiment that separates the remaining candidates")
+        print("--experiment FILE writes an experiment that tells the rivals apart")
         return
     diagnosis.experiment.write(path)
-    print(f"{path}: the experiment that separates the remaining candidates")
+    print(f"{path}: the experiment that tells the rivals apart")
 
 
 def _require_out(arguments: argparse.Namespace) -> None:

@@ -15,7 +15,7 @@ if TYPE_CHECKING:
     from workbench.discriminate.discrimination import Played, Player, Round
     from workbench.discriminate.experiment_design import Bounds, DesignedExperiment
 
-HELP = "diagnose, then play experiments until the remaining candidates differ (moves the valve)"
+HELP = "diagnose, then play experiments until one of several equally good effects is left (moves the valve)"
 EXAMPLE = "positioner discriminate site.toml --rec rec.csv --valve better.toml --out told"
 
 EXPERIMENT = "experiment-{}.csv"

@@ -4,8 +4,7 @@ Without a file it prints the catalogue; with one it puts it between that file's 
 """
 
 import sys
-from collections import defaultdict
-from collections.abc import Iterator, Sequence
+from collections.abc import Iterator
 from pathlib import Path
 
 from sim.effect import PLACES, Effect, Parameter, shipped_effect, shipped_effects
@@ -23,20 +22,7 @@ def catalogue() -> str:
     by_place = [(place, [each.name for each in along if each.places[0] == place]) for place in PLACES]
     overview = "\n".join(f"- {place}: {', '.join(f'`{name}`' for name in names)}" for place, names in by_place if names)
     sections = ["\n\n".join(_section(each)) for each in along]
-    return "\n\n".join([overview, *sections, "### What tells them apart", "\n".join(_apart(along))])
-
-
-def _apart(effects: Sequence[Effect]) -> list[str]:
-    """Return what tells effects, or an effect and a parameter of the bare valve, apart, each behind its pairs."""
-    told = {
-        tuple(sorted((effect.name, other))): how or "no record of pressure and position"
-        for effect in effects
-        for other, how in effect.confounded.items()
-    }
-    pairs: dict[str, list[str]] = defaultdict(list)
-    for (one, other), how in sorted(told.items()):
-        pairs[how].append(f"`{one}` and `{other}`")
-    return [f"- {', '.join(each)}: {how}" for how, each in pairs.items()]
+    return "\n\n".join([overview, *sections])
 
 
 def renew_catalogue(document: str) -> str:
