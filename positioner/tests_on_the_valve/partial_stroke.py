@@ -17,7 +17,7 @@ each beyond its own +-. Break-out is counted from the command in force: a stem t
 
 from collections.abc import Iterator
 from dataclasses import dataclass
-from math import hypot, sqrt
+from math import hypot
 
 import numpy as np
 
@@ -36,6 +36,7 @@ from positioner.tests_on_the_valve.breakout import (
 )
 from positioner.tests_on_the_valve.outcome import Curve, Outcome, Picture, Quantity
 from positioner.tests_on_the_valve.program import SHORTEST_S, Bounds, Leap, Played, Program, ramped, require_within
+from positioner.tests_on_the_valve.ramps import difference, legs_of, ramps_of
 from positioner.tests_on_the_valve.thresholds import THRESHOLDS
 
 TEST = "partial stroke test"
@@ -213,8 +214,8 @@ def _figures(
         out_pa = Figure(abs(found.command_pa - float(command_pa[begins])), found.plus_minus_pa)
         out_s = Figure(found.time_s - float(time_s[begins]), gap_s)
         within = _time_to(recording, rest, found, asked.travel * stroke_m, gap_s, state)
-    friction = _friction(recording, rest, travel, state)
     after = rest_after(recording)
+    friction = _friction(recording, rest, after, state)
     unrested = no_value("broken off, or too few samples of the rest after it")
     off = unrested
     if after is not None and state.played:
@@ -244,20 +245,14 @@ def _time_to(
     return Figure(float(recording.time_s[found.row + int(reached[0])]) - found.time_s, 2.0 * gap_s)
 
 
-def _friction(recording: Recording, rest: Rest, travel: Figure, state: ExperimentState) -> Figure:
-    """Return the half distance of the commands on both ways through the inner part of the travel."""
-    if state is not ExperimentState.TURNED or travel.value is None:
+def _friction(recording: Recording, rest: Rest, after: Rest | None, state: ExperimentState) -> Figure:
+    """Return the half distance of the lines of both ways, midway on the part of the travel that both went."""
+    if state is not ExperimentState.TURNED or after is None:
         return no_value("the stem was not moved there and back")
-    p, gone = recording.command_pa, np.abs(recording.position_m - rest.position_m)
-    turn = int(np.argmax(np.abs(p - p[0])))
-    inside = (gone > THRESHOLDS.inner_partial[0] * travel.value) & (gone < THRESHOLDS.inner_partial[1] * travel.value)
-    rows = np.arange(len(p))
-    ways = [p[inside & (rows <= turn) & (rows >= rest.rows)], p[inside & (rows > turn)]]
-    if min(map(len, ways)) < THRESHOLDS.fewest_in_bin:
-        return no_value("too few samples of both ways: a slower ramp has more")
-    apart = abs(float(np.mean(ways[0]) - np.mean(ways[1])))
-    error = sqrt(sum(float(np.var(each, ddof=1)) / len(each) for each in ways))
-    return Figure(0.5 * apart, error)
+    ramps, x = ramps_of(legs_of(recording)), recording.position_m
+    turn_m = float(x[int(np.argmax(np.abs(x - rest.position_m)))])
+    up, down = (ramps.at_slowest(way, 0.5 * (turn_m + after.position_m)) for way in (1, -1))
+    return difference(up, down, 0.5)
 
 
 def _against(now: dict[str, Figure], reference: Outcome, limits: tuple[float, float]) -> Iterator[ValveTestVerdict]:

@@ -89,8 +89,6 @@ class Thresholds:
     """A stem so near an end is pressed onto it, and has to be back there after a partial stroke."""
     same_command: float = 0.02
     """Of it: commands before two tests that differ by more are not the same."""
-    inner_partial: tuple[float, float] = (0.2, 0.8)
-    """Of a partial stroke's travel, where friction is taken from both ways: it begins and ends with a slip."""
 
     one_way: float = 0.45
     """Of the time limit, of a continuous stroke: forth, and once it has moved, back."""

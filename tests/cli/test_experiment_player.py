@@ -7,7 +7,8 @@ import pytest
 
 from config.codes import ExperimentState, Fault
 from config.recording import Recording
-from positioner.cli.parts.experiment_player import is_of, why_not
+from positioner.cli.parts import experiment_player
+from positioner.cli.parts.experiment_player import is_of, wait_until_landed, why_not
 from positioner.dcs import Dcs
 
 
@@ -33,6 +34,26 @@ class Panel:
 )
 def test_of_a_fault_it_is_said_which(state: ExperimentState, fault: Fault, said: str) -> None:
     assert why_not(state, cast(Dcs, Panel(fault))) == said
+
+
+class Landing:
+    """A daemon whose command goes on for forty cycles."""
+
+    cycles = 0.0
+
+    def get(self, name: str) -> float:
+        self.cycles += name == "cycles"
+        return self.cycles if name == "cycles" else min(self.cycles, 40.0)
+
+
+def test_a_test_begins_once_the_law_has_held_its_command_for_ten_cycles(monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr(experiment_player, "LANDING_POLL_S", 0.0)
+    valve = Landing()
+    wait_until_landed(cast(Dcs, valve))
+    assert valve.cycles >= 50.0
+    monkeypatch.setattr(experiment_player, "LANDS_WITHIN_S", 0.0)
+    wait_until_landed(cast(Dcs, valve))
+    assert valve.cycles < 60.0, "a law that never holds its command is not waited for without end"
 
 
 FAST = ((0.0, 20e3), (1.0, 20e3), (3.0, 100e3), (4.0, 100e3), (6.0, 20e3), (7.0, 20e3))

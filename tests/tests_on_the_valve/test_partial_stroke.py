@@ -51,6 +51,17 @@ def reference() -> Outcome:
     return outcome_of(VirtualValve(TIGHT, initial=WIDE_OPEN))
 
 
+@pytest.mark.parametrize("noise", [0.0, 0.003, 0.01])
+@pytest.mark.parametrize("friction_n", [60.0, 100.0, 150.0])
+def test_friction_is_of_the_part_that_both_ways_went(friction_n: float, noise: float) -> None:
+    """Midway the stem stays by its friction short of where it was: commands of other places are not compared."""
+    file = told(coulomb_n=0.99 * friction_n, static_n=1.01 * friction_n)
+    friction = outcome_of(VirtualValve(file, initial=MIDWAY, noise=noise)).figure("friction_at_rate_pa")
+    late_pa = 140e3 / 60.0 * PERIOD_S  # a position is shown with the command that acts from then on
+    assert friction.value == pytest.approx(friction_n / AREA_M2 + late_pa, abs=1.5 * (friction.plus_minus or 0.0))
+    assert friction.plus_minus == pytest.approx(0.0, abs=0.1 * friction_n / AREA_M2 + 1.5 * noise * STROKE_M * SLOPE)
+
+
 @pytest.mark.parametrize(
     ("initial", "noise"), [(ON_THE_SEAT, 0.001), (MIDWAY, 0.0), (WIDE_OPEN, 0.0)], ids=["seat, noisy", "midway", "open"]
 )

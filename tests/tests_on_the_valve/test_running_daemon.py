@@ -77,10 +77,10 @@ def running(folder: Path, device: int, more: str = "") -> Iterator[Site]:
         yield site
 
 
-def wait_until_it_plays(site: Site) -> None:
+def wait_until(site: Site, register: str, value: int) -> None:
     due_s = time.monotonic() + 120.0
     with site.dcs() as dcs:
-        while dcs.get("experiment_state") != ExperimentState.UNDER_WAY:
+        while dcs.get(register) != value:
             assert time.monotonic() < due_s
             time.sleep(0.1)
 
@@ -96,6 +96,7 @@ def test_steps_and_continuous_stroke_are_played_one_at_a_time_and_power_that_is_
             assert "the mode is not automatic" in capsys.readouterr().err
             with site.dcs() as dcs:
                 dcs.set("mode", 2)
+                wait_until(site, "mode", 2)
                 assert main(["steps", *words]) == 1
                 assert "the DCS has not consented" in capsys.readouterr().err
                 dcs.set("experiment_consent", 1)
@@ -108,7 +109,7 @@ def test_steps_and_continuous_stroke_are_played_one_at_a_time_and_power_that_is_
 
             command = [sys.executable, "-m", "positioner.cli", "pst", *words, "--keep", "as_left"]
             with subprocess.Popen(command, stderr=subprocess.PIPE, text=True) as tester:
-                wait_until_it_plays(site)
+                wait_until(site, "experiment_state", ExperimentState.UNDER_WAY)
                 assert main(["pst", *words]) == 1
                 assert "an experiment is under way" in capsys.readouterr().err
                 site.daemon.kill()

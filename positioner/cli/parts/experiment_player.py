@@ -22,6 +22,8 @@ if TYPE_CHECKING:
 RECORDED_WITHIN_S, BROKEN_OFF_WITHIN_S = 30.0, 5.0
 """Until the recorder has written an experiment; one that was broken off, for one that was refused has no rows."""
 PLAY_POLL_S = 0.3
+LANDED_CYCLES, LANDS_WITHIN_S, LANDING_POLL_S = 10, 10.0, 0.05
+"""A law that has held its command for so many cycles has landed the stem; one that never holds is not waited for."""
 LATEST_FILES = 2
 """Of the recorder, in which an experiment may lie."""
 TRIED_BEGINS = 200
@@ -31,7 +33,7 @@ SAME_PRESSURE_SHARE, LEAST_PLAYED_SHARE = 0.01, 0.95
 
 
 def require_ready(file: "DaemonFile", arguments: argparse.Namespace) -> None:
-    """Look whether a daemon answers, in automatic, with consent, records, and has its stem where it may play.
+    """Look whether a daemon answers, in automatic, with consent, records, and has its stem at rest where it may play.
 
     Raises:
         InputError: no recorder in the file, or its folder is not on this machine.
@@ -65,6 +67,7 @@ def require_ready(file: "DaemonFile", arguments: argparse.Namespace) -> None:
                 f"the stem is at {position:.3g} of its stroke, outside [experiment] travel_window = "
                 f"[{least:g}, {most:g}]: move it there, by positioner set reference"
             )
+        wait_until_landed(dcs)
 
 
 class RunningValve:
@@ -135,6 +138,16 @@ def player_on(file: "DaemonFile", arguments: argparse.Namespace) -> "Player":
         return Played(played.recording if whole else None, played.problem)
 
     return play
+
+
+def wait_until_landed(dcs: "Dcs") -> None:
+    """Wait for the law, which the test before may have left with a way to go: travels are counted from a rest."""
+    due_s = time.monotonic() + LANDS_WITHIN_S
+    command_pa, since = dcs.get("command"), dcs.get("cycles")
+    while time.monotonic() < due_s and dcs.get("cycles") < since + LANDED_CYCLES:
+        time.sleep(LANDING_POLL_S)
+        if (now_pa := dcs.get("command")) != command_pa:
+            command_pa, since = now_pa, dcs.get("cycles")
 
 
 def why_not(state: "ExperimentState", dcs: "Dcs") -> str:
