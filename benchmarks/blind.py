@@ -212,8 +212,8 @@ def single(each: Line) -> bool:
 
 def summary(lines: Sequence[Line]) -> Iterator[str]:
     """Yield the table of docs/blind.md: a row a family; what is counted is visible, but where nothing is hidden."""
-    heads = ("cases", "visible", "true effect named", "one alone named: right", "unexplained", "none named")
-    yield f"| family | {' | '.join(heads)} | error over the floor | s a case |"
+    heads = ("cases", "visible", "true effect named", "named alone, and right", "unexplained", "none named")
+    yield f"| family | {' | '.join(heads)} | error, floors | time, s |"
     yield "|---" * (len(heads) + 3) + "|"
     for family in SEEDS:
         chosen = [each for each in lines if each["family"] == family]

@@ -188,7 +188,7 @@ def test_what_stands_in_backticks_exists(document: Path) -> None:
 
 @each_document
 def test_every_command_line_can_be_parsed(document: Path) -> None:
-    if document.name == "adding.md":  # what is added, test_recipes follows
+    if document.name.startswith("add-"):  # what is added, test_recipes follows
         return
     for line in lines(document.read_text(encoding="utf-8")):
         words = shlex.split(line, comments=True) if re.match(r"(positioner|make|python) ", line) else []

@@ -1,4 +1,4 @@
-"""The recipes of `docs/adding.md`, each followed block by block in a copy of the tree."""
+"""The recipes, `docs/add-*.md`, each followed block by block in a copy of the tree."""
 
 import os
 import re
@@ -25,12 +25,11 @@ ROOMS = (
     "webpage",
     "workbench",
 )
-GUIDE = (ROOT / "docs" / "adding.md").read_text(encoding="utf-8")
-RECIPES = dict(re.findall(r"^## (.+)\n((?:(?!^##).*\n)+)", GUIDE, re.MULTILINE))
+RECIPES = {path.stem: path.read_text(encoding="utf-8") for path in sorted((ROOT / "docs").glob("add-*.md"))}
 BEING_WRITTEN = "*.pyc.*"
 """A compiled module that another process has not yet given its name."""
 BLOCK = re.compile(r"^```(\w+) ?([\w/.]*)\n(.*?)^```", re.MULTILINE | re.DOTALL)
-WANTED = {"An effect", "A register", "A fault", "A command", "A law", "A check of doctor"}
+WANTED = {"add-an-effect", "add-a-register", "add-a-fault", "add-a-command", "add-a-law", "add-a-check"}
 
 
 def test_there_is_a_recipe_for_all_that_is_added_often() -> None:

@@ -148,9 +148,9 @@ def test_what_alerts_and_dashboard_name_is_there(site: Site, path: Path) -> None
     assert named <= there
 
 
-def test_every_metric_is_documented_and_what_is_documented_is_there(site: Site) -> None:
-    named = named_in((DEPLOY.parent / "docs" / "interfaces.md").read_text())
-    assert named == {re.sub(r"_(bucket|count|sum)$", "", name) for name, _ in parsed(site.text())}
+def test_every_metric_says_what_it_is(site: Site) -> None:
+    documented = dict(re.findall(r"^# HELP (\w+) (.+)$", site.text(), re.MULTILINE))
+    assert {re.sub(r"_(bucket|count|sum)$", "", name) for name, _ in parsed(site.text())} <= set(documented)
 
 
 def test_labels_in_alerts_and_dashboard_have_such_values(site: Site) -> None:
