@@ -21,11 +21,12 @@ all that the pressure went over since the stem last answered, is bounded by what
 
     going on           W <= 1.5 of the most in this direction, or of the most of a turn, and a first step
     after a turn       W <= 1.5 of the most of a turn, for friction differs over the travel, and a first step
-    after the first    W <= what spring balances over the whole stroke, or 2 h + R if that is more
+    after the first    W <= what spring balances over the whole stroke, or 2 |h| + R if that is more; 2 |h| + 2 R where
+                       the pressure's limit turned it round once more
     before that        W < all that the pressure limits allow: nothing is known, and what breaks it loose is sought once
 
-h = u - k x of a landing upward: friction and preload, F_c + F_0, k the slope of slides that went on. The first turn
-needs F_c + F_s, and that is no more than 2 h + R, for R >= F_s - F_c and a preload closes the valve.
+h = u - k x of a landing: friction and preload, F_c + F_0 upward, k the slope of slides that went on. The first turn
+needs F_c + F_s, no more than 2 h + R, for R >= F_s - F_c and a preload closes the valve; to turn once more, 2 F_s.
 
 A stem that goes down while the pressure rises, or up while it falls, twice in a row, is an air-to-close valve's, or its
 position is wired the other way round: each further step would take it farther out of the window.
@@ -111,10 +112,11 @@ class Staircase:
         complete: whether it has given a static law.
         slid_pa: level under which the stem last slid; NaN: not known, for it has not yet, or rests at a stop, which
             bears any excess.
+        slid_direction: of that slide; 0: there was none.
         lowest_pa, highest_pa: levels since it last moved visibly at all, or since the staircase began; NaN at a stop.
         against: slides in a row that went against the pressure.
         most_up_pa, most_down_pa, most_turn_pa: longest way of the level from slide to slide, going on and turning.
-        turn_pa: 2 h + R, the most that the first turn needs; 0: not known.
+        turn_pa: 2 |h| + R, the most that the first turn needs; 0: not known.
     """
 
     level_pa: float
@@ -136,6 +138,7 @@ class Staircase:
     closed: bool = False
     complete: bool = False
     slid_pa: float = nan
+    slid_direction: int = 0
     lowest_pa: float = inf
     highest_pa: float = -inf
     against: int = 0
@@ -216,7 +219,8 @@ class Staircase:
         needed_pa = (going_on_pa if self.slide_m else 0.0) or self.most_turn_pa
         if needed_pa:
             return UNANSWERED * needed_pa + FIRST_STEP * limits.span_pa
-        return max(self.slope_pa_per_m * limits.stroke_m, self.turn_pa) or limits.span_pa
+        again_pa = self.high_pa if self.direction == self.slid_direction else 0.0
+        return max(self.slope_pa_per_m * limits.stroke_m, self.turn_pa + again_pa) or limits.span_pa
 
     def _answered(self, outcome: SlideOutcome, limits: StaircaseLimits) -> "Staircase":
         """Return it with the way of the level begun anew, if the stem moved visibly, or its packing gave way."""
@@ -237,7 +241,7 @@ class Staircase:
             return replace(self, low_pa=max(self.low_pa, self.rise_pa))
         going_m = self.going_m + went_m if outcome.landing and not first else self.going_m
         counted = replace(
-            self._having_needed(outcome, first=first),
+            self._having_needed(outcome),
             going_m=going_m,
             up_m=max(self.up_m, going_m) if outcome.direction > 0 else self.up_m,
             down_m=max(self.down_m, going_m) if outcome.direction < 0 else self.down_m,
@@ -252,15 +256,19 @@ class Staircase:
             return replace(counted, reversal_pa=self.rise_pa) if self.turns else counted
         high_pa = self.rise_pa if self.high_pa < self.low_pa else min(self.high_pa or self.rise_pa, self.rise_pa)
         slope_pa_per_m = self.rise_pa / went_m
-        over_pa = self.level_pa - slope_pa_per_m * outcome.position_m
-        turn_pa = 2.0 * over_pa + self.rise_pa if outcome.direction > 0 else self.turn_pa
+        over_pa = abs(self.level_pa - slope_pa_per_m * outcome.position_m)
+        turn_pa = 2.0 * over_pa + self.rise_pa
         return replace(counted, high_pa=high_pa, slope_pa_per_m=slope_pa_per_m, turn_pa=turn_pa)
 
-    def _having_needed(self, outcome: SlideOutcome, *, first: bool) -> "Staircase":
-        """Return it with how far the level went from slide to slide; the first slide of all tells nothing of that."""
-        way_pa = abs(self.level_pa - self.slid_pa)
-        stairs = replace(self, slid_pa=self.level_pa if outcome.landing else nan)
-        if first:  # a NaN is no longer than anything
+    def _having_needed(self, outcome: SlideOutcome) -> "Staircase":
+        """Return it with how far the level went from slide to slide; the first slide of all tells nothing of that.
+
+        One that goes on where the staircase has turned twice, for the pressure's limit moved nothing, is no turn.
+        """
+        way_pa, turned = abs(self.level_pa - self.slid_pa), outcome.direction != self.slid_direction
+        slid_pa = self.level_pa if outcome.landing else nan
+        stairs = replace(self, slid_pa=slid_pa, slid_direction=outcome.direction)
+        if turned:  # a NaN is no longer than anything
             return replace(stairs, most_turn_pa=max(self.most_turn_pa, way_pa))
         if outcome.direction > 0:
             return replace(stairs, most_up_pa=max(self.most_up_pa, way_pa))
