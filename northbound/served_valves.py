@@ -1,14 +1,16 @@
 """The valves of daemons' files, for the commands that observe them: where each is served, and by which certificates."""
 
 import argparse
+import sys
 from collections.abc import Iterator, Mapping, Sequence
 from pathlib import Path
 from typing import TYPE_CHECKING
 
+from config.errors import InputError
+from config.roles import Role
 from positioner.cli.parts.daemon_address import client_tls
 
 if TYPE_CHECKING:
-    from config.roles import Role
     from config.tls_table import Tls
     from northbound.observer.watched_valves import Place
 
@@ -37,7 +39,6 @@ def certificates(arguments: argparse.Namespace) -> "tuple[Tls | None, dict[Role,
     """
     import ssl
 
-    from config.errors import InputError
     from fieldbus.modbus.client_roles import identity_in
 
     if arguments.tls is None:
@@ -64,7 +65,6 @@ def places_in(
         InputError: a fault in a file; two valves of one name.
     """
     from config.daemon_file import load_valves
-    from config.errors import InputError
     from northbound.observer.watched_valves import Place
 
     names: set[str] = set()
@@ -97,9 +97,7 @@ def set_role_password(file: Path | None, role: str, option: str) -> int:
         InputError: nobody said where, the password is too short, or the file cannot be written.
     """
     import getpass
-    import sys
 
-    from config.errors import InputError
     from config.role_passwords import set_password
 
     if file is None:

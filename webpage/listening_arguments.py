@@ -3,6 +3,8 @@
 import argparse
 from typing import TYPE_CHECKING
 
+from config.errors import InputError
+
 if TYPE_CHECKING:
     from webpage.server import Listening
 
@@ -24,7 +26,6 @@ def listening(arguments: argparse.Namespace) -> "Listening":
     Raises:
         InputError: a port that is none, or a password file that cannot be read or begins with nothing.
     """
-    from config.errors import InputError
     from webpage.server import Listening
 
     if arguments.listen_port is not None:
@@ -46,7 +47,6 @@ def require_port(option: str, port: int) -> None:
     Raises:
         InputError: it is none.
     """
-    from config.errors import InputError
 
     if not 0 <= port <= MOST_PORT:
         raise InputError(option, f"must lie between 0 (any free one) and {MOST_PORT}, got {port}")

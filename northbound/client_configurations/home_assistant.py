@@ -9,6 +9,8 @@ from collections.abc import Iterator, Sequence
 from itertools import groupby
 from typing import TYPE_CHECKING
 
+from config.registers import BY_NAME
+
 if TYPE_CHECKING:
     from config.daemon_file import DaemonFile
 
@@ -40,7 +42,6 @@ def _lines(files: "Sequence[DaemonFile]") -> Iterator[str]:
 
 
 def _sensors(file: "DaemonFile") -> Iterator[str]:
-    from config.registers import BY_NAME
 
     valve = file.valve.name
     for register in (BY_NAME[name] for name in WATCHED):

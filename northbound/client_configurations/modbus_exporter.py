@@ -8,6 +8,8 @@ import json
 from collections.abc import Iterator, Sequence
 from typing import TYPE_CHECKING
 
+from config.registers import REGISTERS
+
 if TYPE_CHECKING:
     from config.daemon_file import DaemonFile
 
@@ -21,7 +23,6 @@ def modbus_exporter(files: "Sequence[DaemonFile]") -> str:
 
 
 def _lines(files: "Sequence[DaemonFile]") -> Iterator[str]:
-    from config.registers import REGISTERS
 
     for file in files:
         where = file.supervisory

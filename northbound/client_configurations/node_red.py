@@ -10,10 +10,10 @@ from collections.abc import Sequence
 from typing import TYPE_CHECKING, Any
 
 from config.modbus_map import MOST_REGISTERS
+from config.registers import REGISTERS, Register
 
 if TYPE_CHECKING:
     from config.daemon_file import DaemonFile
-    from config.registers import Register
 
 REQUEST_EVERY_S = 1
 ANSWER_WITHIN_MS = 200
@@ -60,7 +60,6 @@ return {{topic: {valve}, payload: values}};"""
 
 def node_red(files: "Sequence[DaemonFile]") -> str:
     """Return the flow."""
-    from config.registers import REGISTERS
 
     nodes: list[dict[str, Any]] = [{"id": TAB, "type": "tab", "label": TAB}]
     for row, file in enumerate(files, start=1):
@@ -68,7 +67,7 @@ def node_red(files: "Sequence[DaemonFile]") -> str:
     return json.dumps(nodes, indent=1) + "\n"
 
 
-def _row(row: int, file: "DaemonFile", registers: "Sequence[Register]") -> list[dict[str, Any]]:
+def _row(row: int, file: "DaemonFile", registers: Sequence[Register]) -> list[dict[str, Any]]:
     where, valve = file.supervisory, json.dumps(file.valve.name)
     table = json.dumps([[each.name, each.address, each.type, each.format.words] for each in registers])
     kinds: list[tuple[str, str, dict[str, Any]]] = [
@@ -98,7 +97,7 @@ def _row(row: int, file: "DaemonFile", registers: "Sequence[Register]") -> list[
     ]
 
 
-def _blocks(registers: "Sequence[Register]") -> list[tuple[int, int]]:
+def _blocks(registers: Sequence[Register]) -> list[tuple[int, int]]:
     """Return the requests that read all registers: first address and number of each."""
     left = sorted(registers, key=lambda each: each.address)
     blocks = []

@@ -8,21 +8,21 @@ import json
 from collections.abc import Iterator, Sequence
 from typing import TYPE_CHECKING
 
+from config.registers import REGISTERS, Register
+
 if TYPE_CHECKING:
     from config.daemon_file import DaemonFile
-    from config.registers import Register
 
 MEASUREMENT = "positioner"
 
 
 def telegraf(files: "Sequence[DaemonFile]") -> str:
     """Return the configuration for the valves of a daemon's file."""
-    from config.registers import REGISTERS
 
     return "".join(f"{line}\n" for file in files for line in _valve(file, REGISTERS))
 
 
-def _valve(file: "DaemonFile", registers: "Sequence[Register]") -> Iterator[str]:
+def _valve(file: "DaemonFile", registers: Sequence[Register]) -> Iterator[str]:
     where = file.supervisory
     yield "[[inputs.modbus]]"
     yield f"  name = {json.dumps(file.valve.name)}"

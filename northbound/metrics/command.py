@@ -2,8 +2,13 @@
 
 import argparse
 from pathlib import Path
+from threading import Event
 
+from config.errors import InputError
+from config.extras import import_extra
+from northbound.served_valves import places_in
 from positioner.cli.parts.config_argument import add_config, config_files
+from positioner.cli.parts.daemon_address import client_tls
 from webpage.listening_arguments import add_listening
 
 HELP = "serve the metrics of running valves to Prometheus (HTTP, /metrics)"
@@ -20,12 +25,7 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
 
 def run(arguments: argparse.Namespace) -> int:
     """Serve until told to end."""
-    from threading import Event
 
-    from config.errors import InputError
-    from config.extras import import_extra
-    from northbound.served_valves import places_in
-    from positioner.cli.parts.daemon_address import client_tls
     from webpage.listening_arguments import require_port
 
     import_extra("prometheus_client", "positioner metrics")

@@ -3,6 +3,8 @@
 import argparse
 from pathlib import Path
 
+from config.errors import InputError
+from config.extras import import_extra
 from northbound.served_valves import add_certificates, certificates, places_in, set_role_password
 from positioner.cli.parts.config_argument import add_config, config_files
 from webpage.listening_arguments import add_listening, require_port
@@ -38,8 +40,6 @@ def run(arguments: argparse.Namespace) -> int:
     Raises:
         InputError: a fault in a file; no users, no keys; it cannot listen there.
     """
-    from config.errors import InputError
-    from config.extras import import_extra
     from config.passwords import SignIn
     from config.role_passwords import read_passwords
 

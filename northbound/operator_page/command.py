@@ -5,6 +5,7 @@ from collections.abc import Iterator
 from pathlib import Path
 from typing import TYPE_CHECKING
 
+from config.errors import InputError
 from northbound.served_valves import add_certificates, certificates, places_in, set_role_password
 from webpage.listening_arguments import add_listening, listening
 
@@ -66,7 +67,6 @@ def _places(arguments: argparse.Namespace) -> "Iterator[Place]":
         InputError: a fault in a daemon's file; two valves of one name; an address beside a file.
     """
     from config.daemon_file import SupervisoryTable
-    from config.errors import InputError
     from config.loading import validate
     from northbound.observer.watched_valves import Place
 

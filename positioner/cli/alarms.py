@@ -1,12 +1,12 @@
 """`positioner alarms`: the alarms of a running valve; acknowledges and shelves them."""
 
 import argparse
-from typing import TYPE_CHECKING
+import json
 
+from config.alarm_advice import ADVICE
+from config.codes import Ne107Cause
+from config.errors import InputError
 from positioner.cli.parts.daemon_address import add_connection, connect_dcs
-
-if TYPE_CHECKING:
-    from config.codes import Ne107Cause
 
 HELP = "list the alarms of a valve with cause and advice; acknowledge or shelve one"
 EXAMPLE = "positioner alarms --acknowledge friction_high"
@@ -27,7 +27,6 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
 
 def run(arguments: argparse.Namespace) -> int:
     """Do what is asked for, then print the alarms; exit status 1 while one is unacknowledged."""
-    import json
 
     from northbound.observer.alarms import BITS, alarms
 
@@ -54,14 +53,12 @@ def run(arguments: argparse.Namespace) -> int:
     return 1 if any(each.unseen for each in shown) else 0
 
 
-def _cause(name: str) -> "Ne107Cause":
+def _cause(name: str) -> Ne107Cause:
     """Return the cause of an alarm's name.
 
     Raises:
         InputError: there is none; names those there are.
     """
-    from config.alarm_advice import ADVICE
-    from config.errors import InputError
 
     for each in ADVICE:
         if each.name.lower() == name:
@@ -70,7 +67,6 @@ def _cause(name: str) -> "Ne107Cause":
 
 
 def _seconds(minutes: float) -> float:
-    from config.errors import InputError
 
     if not 0.0 < minutes < 1e5:
         raise InputError("--minutes", f"must be more than 0 and less than 100000, got {minutes:g}")

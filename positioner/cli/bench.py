@@ -4,6 +4,8 @@ import argparse
 import sys
 from pathlib import Path
 
+from config.errors import InputError
+
 HELP = "score this and other methods on loops and effects whose true cause is known"
 EXAMPLE = "positioner bench cases --drawn 300"
 RESULTS = "results.csv"
@@ -32,7 +34,6 @@ def run(arguments: argparse.Namespace) -> int:
     """Write the cases, answer them where that is not done, and print the scores; 0."""
     from concurrent.futures import ProcessPoolExecutor
 
-    from config.errors import InputError
     from workbench.bench.cases import CASES, read_cases, write_cases
     from workbench.bench.methods import answers_of
     from workbench.bench.scores import Answer, read_results, tell_scores, write_results

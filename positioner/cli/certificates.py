@@ -3,6 +3,11 @@
 import argparse
 from pathlib import Path
 
+from config.errors import InputError
+from config.hosts import is_host
+from config.roles import Role
+from config.whole_file import filling
+
 HELP = "make certificates for trials of Modbus/TCP Security: an authority, each end, each role"
 EXAMPLE = "positioner certificates -o certificates --host gateway-7 --host 10.0.0.7"
 
@@ -27,10 +32,6 @@ def run(arguments: argparse.Namespace) -> int:
     Raises:
         InputError: a host name that is none; a folder that is not empty, or cannot be written.
     """
-    from config.errors import InputError
-    from config.hosts import is_host
-    from config.roles import Role
-    from config.whole_file import filling
     from positioner.cli.parts.authority import Authority, Owner
 
     hosts = tuple(arguments.host or HERE)

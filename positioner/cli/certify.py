@@ -4,6 +4,7 @@ import argparse
 from pathlib import Path
 from typing import TYPE_CHECKING
 
+from config.errors import InputError
 from positioner.cli.parts.config_argument import add_config, config_file
 
 if TYPE_CHECKING:
@@ -35,7 +36,6 @@ def run(arguments: argparse.Namespace) -> int:
 
 
 def _certificate(file: "DaemonFile", folder: Path) -> "Certificate | Refused":
-    from config.errors import InputError
     from positioner.control.laws.slides.certificate import Refused, certified, known_valve
     from positioner.control.laws.slides.slide_law import SlideSettings
     from positioner.daemon.memory.conditions import conditions_of

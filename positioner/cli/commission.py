@@ -1,11 +1,19 @@
 """`positioner commission`: from an I/P and a position reading alone to a file with which the daemon runs."""
 
 import argparse
+import sys
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
+from config.errors import InputError
+from config.file_kinds import require_kind
+from config.toml_text import with_values
+from config.whole_file import replace_whole
+from positioner.cli.parts.breaking_off import end_as_by_ctrl_c
 from positioner.cli.parts.config_argument import add_config, config_file
 from positioner.cli.parts.output_files import writable, write_json
+from positioner.cli.parts.own_valve import own_valve, unknown_travel
+from positioner.cli.parts.valve_test import kept
 
 if TYPE_CHECKING:
     from config.daemon_file import DaemonFile
@@ -40,11 +48,7 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
 
 def run(arguments: argparse.Namespace) -> int:
     """Commission, print, ask, write; 0 if it came to a file, else 1."""
-    import sys
 
-    from positioner.cli.parts.breaking_off import end_as_by_ctrl_c
-    from positioner.cli.parts.own_valve import own_valve, unknown_travel
-    from positioner.cli.parts.valve_test import kept
     from positioner.control.settings import Settings
     from positioner.tests_on_the_valve.commissioning import commission
 
@@ -76,8 +80,6 @@ def _file(path: Path, name: str | None) -> "DaemonFile":
         InputError: there is none, which says what to write; as `load_daemon`, or it has several valves.
     """
     from config.daemon_file import DaemonFile, load_daemon
-    from config.errors import InputError
-    from config.file_kinds import require_kind
     from config.loading import read_toml, validate
 
     if not path.exists():
@@ -99,9 +101,6 @@ def _write_proposals(
 ) -> int:
     """Show what is proposed, ask, and write it; 0 if it was written."""
     from config.daemon_file import load_daemon
-    from config.errors import InputError
-    from config.toml_text import with_values
-    from config.whole_file import replace_whole
 
     by_valve = file.law is not None and file.law.valve is not None
     told = [each for each in proposals if not (by_valve and each.table == "law")]

@@ -4,7 +4,10 @@ import argparse
 from pathlib import Path
 
 from positioner.cli.parts.fit_arguments import add_noise_and_exports, read_with_noise
+from positioner.cli.parts.model_arguments import read_valve
+from positioner.cli.parts.naming import naming
 from positioner.cli.parts.output_files import writable, write_json
+from positioner.cli.parts.progress import at_work
 
 HELP = "simulate a recording and print where the model fails; exit status 1 if it is not adequate"
 EXAMPLE = "positioner compare rec.csv --valve seed --report compared.html"
@@ -21,9 +24,6 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
 
 def run(arguments: argparse.Namespace) -> int:
     """Compare and print; 0 if the model is adequate, else 1."""
-    from positioner.cli.parts.model_arguments import read_valve
-    from positioner.cli.parts.naming import naming
-    from positioner.cli.parts.progress import at_work
     from workbench.compare.comparison import compare
 
     writable(arguments.json, "--json")

@@ -3,6 +3,8 @@
 import argparse
 from pathlib import Path
 
+from config.extras import import_extra
+
 HELP = "print the completion script of a shell"
 EXAMPLE = "positioner completion bash > positioner.bash; source positioner.bash"
 
@@ -16,7 +18,6 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
 
 def run(arguments: argparse.Namespace) -> int:
     """Print the words of the shell; 0."""
-    from config.extras import import_extra
     from positioner.cli.main import command_parser
 
     shtab = import_extra("shtab", "positioner completion")

@@ -28,8 +28,10 @@ from itertools import pairwise
 from pathlib import Path
 from typing import TYPE_CHECKING
 
-from config.codes import Mode
+from config.codes import Fault, InhibitReason, Mode, Refusal
 from config.errors import InputError
+from config.registers import STATISTICS
+from positioner.cli.parts.children import port_in
 from positioner.cli.parts.clone_only import benchmark
 from positioner.cli.parts.demo_folder import demo_folder, recording_in
 from positioner.cli.parts.output_files import writable, write_json
@@ -260,7 +262,6 @@ def _folder(asked: Path | None) -> Iterator[Path]:
 
 def _both_laws(bus: str, folder: Path, valve: "ValveParameters") -> DemoOutcome:
     """Run the valve, and on it a daemon for each law."""
-    from positioner.cli.parts.children import port_in
 
     _print_line("starting a simulated valve and the daemon")
     with slave_running(bus, folder, "seed", ageing(valve)) as (setup, slave):
@@ -342,14 +343,12 @@ def _begin(dcs: "Dcs") -> None:
 
 
 def _statistics(dcs: "Dcs") -> dict[str, float]:
-    from config.registers import STATISTICS
 
     return dcs.get_all(*(register.name for register in STATISTICS))
 
 
 def _acknowledge(dcs: "Dcs") -> bool:
     """Acknowledge, as an operator would, what a busy machine has latched, and say it; return whether anything was."""
-    from config.codes import Fault
 
     for number in range(ACKNOWLEDGEMENTS):
         if not (fault := int(dcs.get("fault"))):
@@ -394,7 +393,6 @@ def _identify(
 
 
 def _compare_estimate(dcs: "Dcs", phase: str, name: str, true: float) -> ComparedEstimate:
-    from config.codes import Refusal
 
     now = dcs.get_all(f"{name}_e", f"{name}_std", f"{name}_reason")
     reason = Refusal(int(now[f"{name}_reason"]))
@@ -428,7 +426,6 @@ def _steps(
 
 def _step(dcs: "Dcs", phase: str, reference_pu: float, step_s: float) -> tuple[float, bool]:
     """Make a step of the reference; return where the stem settles, p.u., and whether it went there by steps."""
-    from config.codes import InhibitReason
 
     dcs.set("reference", reference_pu)
     label = f"{phase}: step to {reference_pu:g} p.u."

@@ -1,14 +1,22 @@
 """`positioner diagnose`: which effect is missing."""
 
 import argparse
+import time
 from collections.abc import Iterator
 from contextlib import contextmanager
+from math import inf
 from pathlib import Path
 from typing import TYPE_CHECKING
 
+from config.errors import CommandFailed, InputError
 from positioner.cli.parts.export_arguments import take_mapping
 from positioner.cli.parts.fit_arguments import add_noise_and_exports, add_pressure, add_test, read_fitted
+from positioner.cli.parts.model_arguments import read_valve, require_effects
+from positioner.cli.parts.naming import files_named, naming
+from positioner.cli.parts.next_step import by_pressure_command, discover_command, extend_commands, not_written
 from positioner.cli.parts.output_files import writable, write_json
+from positioner.cli.parts.progress import Progress, at_work
+from workbench.fit.breaking_off import BrokenOff
 
 if TYPE_CHECKING:
     from config.recording import Recording
@@ -63,13 +71,7 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
 
 def run(arguments: argparse.Namespace) -> int:
     """Diagnose and print; 0 if nothing is missing and nothing in the valve file is off, else 1."""
-    import time
-    from math import inf
 
-    from positioner.cli.parts.model_arguments import read_valve, require_effects
-    from positioner.cli.parts.naming import files_named, naming
-    from positioner.cli.parts.next_step import by_pressure_command, discover_command, extend_commands
-    from positioner.cli.parts.progress import Progress
     from workbench.data.imposed_motion import is_imposed
     from workbench.diagnosis.diagnosis import diagnose
     from workbench.diagnosis.diagnosis_json import as_json
@@ -133,8 +135,6 @@ def _end_without_result() -> Iterator[None]:
     Raises:
         CommandFailed: it is.
     """
-    from config.errors import CommandFailed
-    from workbench.fit.breaking_off import BrokenOff
 
     try:
         yield
@@ -158,7 +158,6 @@ def _require_out(arguments: argparse.Namespace) -> None:
     Raises:
         InputError: it has none.
     """
-    from config.errors import InputError
 
     if arguments.add and arguments.out is None:
         raise InputError("--add", "needs -o BETTER.toml, where the valve is written")
@@ -172,8 +171,6 @@ def _add_effects(
     arguments: argparse.Namespace,
 ) -> "Extension":
     """Return the valve with the effects that were asked for, gone on from the diagnosis's own fits."""
-    from positioner.cli.parts.naming import files_named, naming
-    from positioner.cli.parts.progress import at_work
     from workbench.diagnosis.extension import extend
 
     named = files_named(arguments.recordings, arguments.test, arguments.valve)
@@ -192,7 +189,6 @@ def _add_effects(
 def _write_valve(diagnosis: "Diagnosis", added: "Extension | None", arguments: argparse.Namespace) -> None:
     """Write what was added or found with its journal, where the diagnosis is sure of that; say so where it is not."""
     from config.valve_file import find_valve
-    from positioner.cli.parts.next_step import not_written
     from workbench.diagnosis.extension import extension_of
     from workbench.diagnosis.extension_journal import write_extended
 

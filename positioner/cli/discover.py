@@ -4,8 +4,14 @@ import argparse
 from pathlib import Path
 from typing import TYPE_CHECKING
 
+from config.errors import InputError
+from config.extras import import_extra
 from positioner.cli.parts.fit_arguments import add_noise_and_exports, add_pressure, add_test, read_fitted
-from positioner.cli.parts.output_files import writable, write_json
+from positioner.cli.parts.model_arguments import read_valve
+from positioner.cli.parts.naming import files_named, naming
+from positioner.cli.parts.next_step import extend_command
+from positioner.cli.parts.output_files import writable, write_json, write_text
+from positioner.cli.parts.progress import at_work
 
 if TYPE_CHECKING:
     from workbench.discover.discovery import Discovery
@@ -32,10 +38,6 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
 
 def run(arguments: argparse.Namespace) -> int:
     """Discover and print; 0 if a form explains the recordings, or nothing is left to explain, else 1."""
-    from config.extras import import_extra
-    from positioner.cli.parts.model_arguments import read_valve
-    from positioner.cli.parts.naming import files_named, naming
-    from positioner.cli.parts.progress import at_work
     from workbench.discover.discovery import discover
     from workbench.discover.discovery_json import as_json
 
@@ -73,7 +75,6 @@ def _require_new(path: Path | None) -> None:
     Raises:
         InputError: it cannot, the file is there already, or its name is none that an effect can have.
     """
-    from config.errors import InputError
 
     writable(path, "-o")
     if path is None:
@@ -92,8 +93,6 @@ def _tell_proposal(names: tuple[str, ...]) -> None:
 
 def _write_form(found: "Discovery", arguments: argparse.Namespace) -> None:
     """Write the best form, and say how it is added; say so where there is none."""
-    from positioner.cli.parts.next_step import extend_command
-    from positioner.cli.parts.output_files import write_text
 
     if not found.found:
         print(f"{arguments.out}: not written: {found.sentence}")

@@ -5,10 +5,15 @@ from itertools import count
 from pathlib import Path
 from typing import TYPE_CHECKING
 
+from config.errors import InputError
+from positioner.cli.parts.breaking_off import end_as_by_ctrl_c, tell_when_broken_off
 from positioner.cli.parts.config_argument import add_config, config_file
 from positioner.cli.parts.daemon_address import add_tls
 from positioner.cli.parts.fit_arguments import add_pressure, add_test
+from positioner.cli.parts.model_arguments import read_valve, require_effects
+from positioner.cli.parts.naming import naming
 from positioner.cli.parts.output_files import make_folder, write_json
+from positioner.cli.parts.progress import Progress
 
 if TYPE_CHECKING:
     from config.daemon_file import DaemonFile
@@ -43,11 +48,7 @@ def run(arguments: argparse.Namespace) -> int:
     """Diagnose, play, print a line a round; 0 if nothing is left to be told apart, else 1."""
     from config.daemon_file import load_daemon
     from config.recording import Recording
-    from positioner.cli.parts.breaking_off import end_as_by_ctrl_c, tell_when_broken_off
     from positioner.cli.parts.experiment_player import player_on, require_ready
-    from positioner.cli.parts.model_arguments import read_valve, require_effects
-    from positioner.cli.parts.naming import naming
-    from positioner.cli.parts.progress import Progress
     from sim.effect import find_effect, tried_effects
     from workbench.diagnosis.diagnosis import diagnose
     from workbench.discriminate.discrimination import discriminate, rivals_of
@@ -103,7 +104,6 @@ def _bounds(file: "DaemonFile", config: Path) -> "Bounds":
     Raises:
         InputError: no room is left.
     """
-    from config.errors import InputError
     from positioner.control.settings import Settings
     from workbench.discriminate.experiment_design import Bounds
 

@@ -1,12 +1,19 @@
 """`positioner doctor`: checks the installation, a daemon's file, its bus, timing and permissions, a line each."""
 
 import argparse
+import os
+import time
 from collections.abc import Callable, Sequence
+from datetime import UTC, datetime
 from functools import partial
 from pathlib import Path
 from typing import TYPE_CHECKING
 
+from config.errors import CommandFailed, InputError
 from positioner.cli.parts.config_argument import add_config, config_file
+from positioner.cli.parts.extended_valves import load_extended_valve
+from positioner.cli.parts.sampling import when_shown
+from positioner.daemon.platform_needs import goes_without, require_platform
 
 if TYPE_CHECKING:
     from config.daemon_file import DaemonFile
@@ -72,7 +79,7 @@ def run(arguments: argparse.Namespace) -> int:
     return 0 if well else 1
 
 
-def _passes(name: str, valve: str, check: "Callable[[], str]") -> bool:
+def _passes(name: str, valve: str, check: Callable[[], str]) -> bool:
     """Make a check and print its line; return whether all is well."""
     try:
         print(f"{name:12} ok    {valve}{check()}")
@@ -112,8 +119,6 @@ def _load(files: "Sequence[DaemonFile]") -> str:
 
 
 def _law(file: "DaemonFile", config: Path) -> str:
-    from config.errors import InputError
-    from positioner.cli.parts.extended_valves import load_extended_valve
 
     try:
         valve = load_extended_valve(file, str(config))
@@ -126,7 +131,6 @@ def _law(file: "DaemonFile", config: Path) -> str:
 
 
 def _bus(file: "DaemonFile", _config: Path) -> str:
-    import time
 
     from drivers.boundary import DriverError, ForeseesRefusal
     from positioner.cli.probe import unfit, watching_driver
@@ -162,10 +166,8 @@ def _bus(file: "DaemonFile", _config: Path) -> str:
 
 
 def _sampling(nudge_pa: float, file: "DaemonFile", _config: Path) -> str:
-    from config.errors import CommandFailed
     from drivers import driver_for
     from drivers.boundary import DriverError
-    from positioner.cli.parts.sampling import when_shown
 
     if file.cycle.pace == "device":
         return "in lockstep: a reply is of after its command has been obeyed for a period"
@@ -200,9 +202,7 @@ def _supervisory(file: "DaemonFile", _config: Path) -> str:
 
 
 def _certificates(file: "DaemonFile", _config: Path) -> str:
-    from datetime import UTC, datetime
 
-    from config.errors import InputError
     from fieldbus.modbus.tls import expiry
 
     tables = {"device.tls": getattr(file.device, "tls", None), "supervisory.tls": file.supervisory.tls}
@@ -222,7 +222,6 @@ def _certificates(file: "DaemonFile", _config: Path) -> str:
 
 def _writable(folder: Path) -> Path:
     """Return a folder that can be written, or made."""
-    import os
 
     nearest = next(each for each in (folder, *folder.parents) if each.exists())
     if not nearest.is_dir():
@@ -265,8 +264,6 @@ def _timing(file: "DaemonFile", _config: Path) -> str:
 
 
 def _system(_file: "DaemonFile", _config: Path) -> str:
-    from config.errors import InputError
-    from positioner.daemon.platform_needs import goes_without, require_platform
 
     try:
         require_platform()
@@ -277,7 +274,6 @@ def _system(_file: "DaemonFile", _config: Path) -> str:
 
 
 def _priority(_file: "DaemonFile", _config: Path) -> str:
-    import os
 
     if not hasattr(os, "sched_setscheduler"):
         return "this system has no SCHED_FIFO"

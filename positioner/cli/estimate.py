@@ -5,7 +5,9 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 from positioner.cli.parts.export_arguments import add_export_arguments, read_any
+from positioner.cli.parts.naming import naming
 from positioner.cli.parts.output_files import writable, write_json
+from positioner.cli.parts.progress import at_work
 
 if TYPE_CHECKING:
     from positioner.estimation.recording_estimates import RecordingEstimates
@@ -32,8 +34,6 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
 
 def run(arguments: argparse.Namespace) -> int:
     """Estimate and print; 0 if the ratios that the law needs are valid, else 1."""
-    from positioner.cli.parts.naming import naming
-    from positioner.cli.parts.progress import at_work
     from positioner.estimation.recording_estimates import estimate
 
     writable(arguments.json, "--json")

@@ -1,10 +1,16 @@
 """`positioner events`: what has happened, out of a daemon's history, also while it runs."""
 
 import argparse
+import json
+import time
 from collections.abc import Collection, Iterator
+from dataclasses import asdict
+from datetime import UTC, datetime
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
+from config.codes import Ne107Status
+from config.errors import InputError
 from positioner.cli.parts.config_argument import add_config, config_file
 
 if TYPE_CHECKING:
@@ -33,7 +39,6 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
 
 def run(arguments: argparse.Namespace) -> int:
     """Print the entries, oldest first."""
-    import time
 
     from positioner.history import HistoryReader
 
@@ -55,7 +60,6 @@ def run(arguments: argparse.Namespace) -> int:
 
 def _require_known(valve: str | None, known: Collection[str]) -> None:
     """Refuse a name that no valve has: nothing printed would read as: nothing has happened."""
-    from config.errors import InputError
 
     if valve is not None and valve not in known:
         there = ", ".join(sorted(known)) or "none"
@@ -69,7 +73,6 @@ def _history_of(source: Path) -> tuple[Path, list[str]]:
         InputError: the daemon's file is at fault, or keeps none.
     """
     from config.daemon_file import load_valves
-    from config.errors import InputError
 
     if source.suffix != ".toml":
         return source, []
@@ -89,7 +92,6 @@ def _found(history: "HistoryReader", arguments: argparse.Namespace, after_row: i
 
 
 def _as_json(entry: Any) -> str:
-    import json
 
     from config.json_value import json_value
 
@@ -97,7 +99,6 @@ def _as_json(entry: Any) -> str:
 
 
 def _in_words(entry: Any) -> str:
-    from config.codes import Ne107Status
     from positioner.history.entries import Event, Write
 
     if isinstance(entry, Event):
@@ -116,7 +117,6 @@ def _in_words(entry: Any) -> str:
 
 
 def _plain(entry: Any) -> Iterator[str]:
-    from dataclasses import asdict
 
     for name, value in asdict(entry).items():
         if name in ("time_s", "hour_s"):
@@ -132,14 +132,11 @@ def _join_printable(*parts: str) -> str:
 
 
 def _clock(time_s: float) -> str:
-    from datetime import UTC, datetime
 
     return f"{datetime.fromtimestamp(time_s, UTC):%Y-%m-%dT%H:%M:%S}.{int(time_s % 1 * 1000):03}Z"
 
 
 def _since(text: str) -> float:
-    import time
-    from datetime import UTC, datetime
 
     if text[-1:] in DURATIONS_S and text[:-1].replace(".", "", 1).isdecimal():
         return time.time() - float(text[:-1]) * DURATIONS_S[text[-1]]

@@ -3,6 +3,9 @@
 import argparse
 from pathlib import Path
 
+from positioner.cli.parts.output_files import writable
+from positioner.cli.parts.progress import at_work
+
 HELP = "write a valve for other simulators, as an FMU (FMI 2.0, co-simulation)"
 EXAMPLE = "positioner export fmu seed -o valve.fmu"
 
@@ -17,8 +20,6 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
 def run(arguments: argparse.Namespace) -> int:
     """Write it, and say what goes in and comes out."""
     from config.valve_file import find_valve, load_valve, valve_alone
-    from positioner.cli.parts.output_files import writable
-    from positioner.cli.parts.progress import at_work
     from sim.composition import Composition
     from sim.fmu.fmu_file import export_fmu
     from sim.fmu.model_description import variables

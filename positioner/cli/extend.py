@@ -1,10 +1,14 @@
 """`positioner extend`: adds effects to a valve file, refits, says how the error fell."""
 
 import argparse
+import time
 from pathlib import Path
 
 from positioner.cli.parts.fit_arguments import add_noise_and_exports, add_pressure, add_test, read_fitted
+from positioner.cli.parts.model_arguments import read_valve, require_effects
+from positioner.cli.parts.naming import files_named, naming
 from positioner.cli.parts.output_files import writable, write_json
+from positioner.cli.parts.progress import at_work
 
 HELP = "add effects to a valve file, fit it, and print the error before and after"
 EXAMPLE = "positioner extend seed --effect backlash --fit rec.csv -o new.toml"
@@ -31,12 +35,8 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
 
 def run(arguments: argparse.Namespace) -> int:
     """Extend and write the new file with its journal; 0 if the held-out error falls, else 1."""
-    import time
 
     from config.valve_file import find_valve
-    from positioner.cli.parts.model_arguments import read_valve, require_effects
-    from positioner.cli.parts.naming import files_named, naming
-    from positioner.cli.parts.progress import at_work
     from workbench.diagnosis.extension import extend
     from workbench.diagnosis.extension_journal import Journal, write_extended
     from workbench.diagnosis.extension_json import as_json

@@ -5,6 +5,10 @@ import sys
 from pathlib import Path
 from typing import TYPE_CHECKING
 
+from config.errors import InputError
+from config.extras import import_extra
+from positioner.cli.parts.output_files import writable
+
 if TYPE_CHECKING:
     from workbench.fleet.examination import Examination
     from workbench.fleet.manifest import Entry
@@ -46,9 +50,6 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
 
 def run(arguments: argparse.Namespace) -> int:
     """Examine what was not examined before, write the tables, print the ranking."""
-    from config.errors import InputError
-    from config.extras import import_extra
-    from positioner.cli.parts.output_files import writable
     from workbench.fleet.drill_down import write_diagnosis_reports
     from workbench.fleet.fleet import at, fleet
     from workbench.fleet.fleet_report import report_fleet

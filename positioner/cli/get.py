@@ -1,7 +1,9 @@
 """`positioner get`: reads the daemon's registers by name."""
 
 import argparse
+import json
 
+from config.registers import BY_NAME, register_named
 from positioner.cli.parts.daemon_address import add_connection, connect_dcs
 
 HELP = "read registers of a running daemon, by name (without a name: all)"
@@ -17,10 +19,8 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
 
 def run(arguments: argparse.Namespace) -> int:
     """Print the values."""
-    import json
 
     from config.json_value import json_value
-    from config.registers import BY_NAME, register_named
     from northbound.observer.words import in_words
 
     names = arguments.names or list(BY_NAME)

@@ -1,8 +1,11 @@
 """`positioner health`: how a running valve is, and how it was used, day by day."""
 
 import argparse
+import datetime
+import json
 from typing import TYPE_CHECKING
 
+from config.registers import BY_NAME
 from positioner.cli.parts.daemon_address import add_connection, connect_dcs
 
 if TYPE_CHECKING:
@@ -28,10 +31,8 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
 
 def run(arguments: argparse.Namespace) -> int:
     """Print it."""
-    import json
 
     from config.json_value import json_value
-    from config.registers import BY_NAME
     from northbound.observer.words import in_words
 
     days = _days(arguments)
@@ -64,7 +65,6 @@ def _days(arguments: argparse.Namespace) -> "tuple[OperationDay, ...]":
 
 def _print_day(day: "OperationDay") -> None:
     """Print a day: a line, and its histograms."""
-    import datetime
 
     from positioner.daemon.health.daily_figures import DAY_S, DEVIATIONS, OPENINGS
     from positioner.daemon.health.travel_accumulator import SPANS

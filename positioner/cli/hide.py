@@ -5,6 +5,9 @@ from collections.abc import Mapping
 from pathlib import Path
 from typing import Any
 
+from config.errors import InputError
+from positioner.cli.parts.progress import at_work
+
 HELP = "make recordings of a valve with a hidden effect, to practise; --reveal prints the answer"
 EXAMPLE = "positioner hide --seed 7 -o blind && positioner diagnose blind/fit.csv --valve blind/valve.toml"
 
@@ -32,7 +35,6 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
 
 def run(arguments: argparse.Namespace) -> int:
     """Hide, or reveal."""
-    from positioner.cli.parts.progress import at_work
     from workbench.blind.hiding import hide
     from workbench.blind.sealing import reveal, seal
 
@@ -58,7 +60,6 @@ def run(arguments: argparse.Namespace) -> int:
 
 
 def _check(arguments: argparse.Namespace) -> None:
-    from config.errors import InputError
 
     if arguments.seed is None:
         raise InputError("--seed", "is needed: a whole number, 0 or more, by which all is drawn")

@@ -3,6 +3,9 @@
 import argparse
 from typing import TYPE_CHECKING
 
+from config.codes import Ne107Cause, Refusal, Sampling
+from config.errors import CommandFailed
+from config.registers import BY_NAME, ESTIMATED
 from positioner.cli.parts.daemon_address import add_connection, connect_dcs
 
 if TYPE_CHECKING:
@@ -27,7 +30,6 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
 
 def run(arguments: argparse.Namespace) -> int:
     """Identify, print what was found, and whether the law uses it now."""
-    from config.errors import CommandFailed
     from northbound.observer.permissives import IDENTIFY_READS, identify_permissives
 
     asked = {
@@ -44,8 +46,6 @@ def run(arguments: argparse.Namespace) -> int:
 
 
 def _report(dcs: "Dcs", problem: str | None) -> int:
-    from config.codes import Ne107Cause, Refusal, Sampling
-    from config.registers import BY_NAME, ESTIMATED
     from positioner.estimation.estimates import refusals_said
 
     reasons = {}

@@ -1,9 +1,14 @@
 """`positioner import`: another program's export, looked at, read, and written as a recording."""
 
 import argparse
+import shlex
 from pathlib import Path
 
+from config.errors import InputError
+from positioner.cli.parts.breaking_off import tell_when_broken_off
 from positioner.cli.parts.export_arguments import add_export_arguments, export_options, read_mapped, take_mapping
+from positioner.cli.parts.output_files import recording_writable
+from positioner.cli.parts.progress import Progress
 
 HELP = "read a file of another program: list its columns and propose options; with -o write a recording"
 EXAMPLE = (
@@ -24,11 +29,7 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
 
 def run(arguments: argparse.Namespace) -> int:
     """Print what the file holds, or what is read of it; 0."""
-    from config.errors import InputError
     from config.plausibility import oddities
-    from positioner.cli.parts.breaking_off import tell_when_broken_off
-    from positioner.cli.parts.output_files import recording_writable
-    from positioner.cli.parts.progress import Progress
     from workbench.imports.own_format import own_recording
 
     take_mapping(arguments)
@@ -58,7 +59,6 @@ def run(arguments: argparse.Namespace) -> int:
 
 def _inspect(arguments: argparse.Namespace) -> int:
     """Show what the file holds, ask what it leaves open, write it down, and say what reads it."""
-    import shlex
 
     from workbench.imports.export_preview import preview
     from workbench.imports.import_questions import ask_for_mapping
@@ -75,7 +75,6 @@ def _inspect(arguments: argparse.Namespace) -> int:
 
 
 def _ask(question: str, otherwise: str) -> str:
-    from config.errors import InputError
 
     print(f"{question} {f'[{otherwise}] ' if otherwise else ''}", end="", flush=True)
     try:

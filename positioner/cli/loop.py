@@ -1,10 +1,12 @@
 """`positioner loop`: does the valve of a control loop stick, from OP, PV and SP alone."""
 
 import argparse
+from dataclasses import asdict
 from pathlib import Path
 
 from positioner.cli.parts.loop_arguments import add_loop_arguments, read_record
 from positioner.cli.parts.output_files import writable, write_json
+from positioner.cli.parts.progress import at_work
 
 HELP = "tell from OP, PV and SP alone whether a valve sticks; exit status 1 if it sticks or is undecided"
 EXAMPLE = "positioner loop FIC101.csv --report loop.html"
@@ -21,9 +23,7 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
 
 def run(arguments: argparse.Namespace) -> int:
     """Print the verdict of each loop; 0 if every valve is without fault, else 1."""
-    from dataclasses import asdict
 
-    from positioner.cli.parts.progress import at_work
     from workbench.loops import diagnose_loop
     from workbench.loops.joint import together
     from workbench.loops.loop_report import report_loop

@@ -4,6 +4,8 @@ import argparse
 import sys
 from pathlib import Path
 
+from config.errors import InputError
+from config.results.block import as_text
 from positioner.cli.parts.output_files import writable, write_json
 
 HELP = "rank the loops of a plant from OP, PV and SP alone; exit status 1 if any valve sticks"
@@ -23,8 +25,6 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
 
 def run(arguments: argparse.Namespace) -> int:
     """Print the ranking; 1 if any valve sticks, else 0."""
-    from config.errors import InputError
-    from config.results.block import as_text
     from workbench.loops.loop_report import report_loops
     from workbench.loops.plant import diagnose_plant, read_manifest
     from workbench.report import require_plotly

@@ -1,11 +1,13 @@
 """`positioner map`: the supervisory register map."""
 
 import argparse
+import json
+import sys
 from pathlib import Path
-from typing import TYPE_CHECKING
 
-if TYPE_CHECKING:
-    from config.registers import Register
+from config.codes import Refusal
+from config.errors import InputError
+from config.registers import REGISTERS, Register
 
 HELP = "print the map of the registers, or the configuration of a program that reads them"
 EXAMPLE = "positioner map --format md"
@@ -59,7 +61,6 @@ def run(arguments: argparse.Namespace) -> int:
 
 def _configuration(reader: str, config: Path | None) -> None:
     from config.daemon_file import load_valves
-    from config.errors import InputError
     from northbound.client_configurations.register_readers import configuration
 
     if config is None:
@@ -68,12 +69,11 @@ def _configuration(reader: str, config: Path | None) -> None:
 
 
 def _map() -> list[dict[str, object]]:
-    from config.registers import REGISTERS
 
     return [_row(register) for register in REGISTERS]
 
 
-def _row(register: "Register") -> dict[str, object]:
+def _row(register: Register) -> dict[str, object]:
     order = "most significant word first" if register.format.words > 1 else ""
     values = (
         register.name,
@@ -92,7 +92,6 @@ def _row(register: "Register") -> dict[str, object]:
 
 
 def _reasons() -> list[dict[str, object]]:
-    from config.codes import Refusal
 
     return [{"number": int(reason), "name": reason.name.lower(), "text": reason.text} for reason in Refusal]
 
@@ -112,7 +111,6 @@ def _cell(value: object) -> str:
 
 def _csv(rows: list[dict[str, object]]) -> None:
     import csv
-    import sys
 
     writer = csv.DictWriter(sys.stdout, rows[0], lineterminator="\n")
     writer.writeheader()
@@ -120,6 +118,5 @@ def _csv(rows: list[dict[str, object]]) -> None:
 
 
 def _json(rows: list[dict[str, object]]) -> None:
-    import json
 
     print(json.dumps(rows, indent=1))

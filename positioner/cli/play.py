@@ -7,7 +7,14 @@ from math import nan, sqrt
 from pathlib import Path
 from typing import TYPE_CHECKING
 
+from config.codes import Mode
+from config.errors import CommandFailed, InputError
 from config.law_names import DEFAULT_LAW, law_names
+from positioner.cli.parts.extended_valves import load_extended_valve
+from positioner.cli.parts.model_arguments import read_valve
+from positioner.cli.parts.output_files import recording_writable
+from positioner.cli.parts.progress import at_work
+from positioner.control.requests import QUIET, Requests
 
 if TYPE_CHECKING:
     from config.daemon_file import DaemonFile
@@ -15,7 +22,6 @@ if TYPE_CHECKING:
     from config.recording import Column, Recording
     from config.slave_file import SlaveFile
     from config.valve_file import ValveParameters
-    from positioner.control.requests import Requests
     from positioner.daemon.snapshot import Snapshot
     from positioner.virtual.virtual_cycle import Script
 
@@ -75,14 +81,9 @@ class Run:
 
 def run(arguments: argparse.Namespace) -> int:
     """Play and write the recording; its time is the reference's, identification lies before it."""
-    from config.errors import CommandFailed
     from config.recording import write_recording
     from config.valve_file import find_valve
     from positioner.cli.parts.csv_series import read_series
-    from positioner.cli.parts.extended_valves import load_extended_valve
-    from positioner.cli.parts.model_arguments import read_valve
-    from positioner.cli.parts.output_files import recording_writable
-    from positioner.cli.parts.progress import at_work
 
     recording_writable(arguments.out, "-o")
     path = find_valve(arguments.valve)
@@ -151,7 +152,6 @@ def _play_daemon(
 
 
 def _require_travel(path: Path, reference_m: "Column", stroke_m: float) -> None:
-    from config.errors import InputError
 
     wrong = (reference_m < 0) | (reference_m > stroke_m)
     if wrong.any():
@@ -184,10 +184,8 @@ def _files(arguments: argparse.Namespace, valve: "ValveParameters") -> tuple["Da
     )
 
 
-def _first_requests(valve: "ValveParameters") -> "Requests":
+def _first_requests(valve: "ValveParameters") -> Requests:
     """Return what an engineer who knows the valve's data sheet asks for: an excitation of a third of the travel."""
-    from config.codes import Mode
-    from positioner.control.requests import Requests
 
     travel_pa = valve.spring_n_per_m * valve.stroke_m / valve.diaphragm_area_m2
     return Requests(
@@ -202,9 +200,7 @@ def _script(time_s: "Column", reference_m: "Column", begin_s: float) -> "Script"
     """Return a DCS that writes the reference, from a time of the device on, s."""
     import numpy as np
 
-    from positioner.control.requests import QUIET
-
-    def ask(snapshot: "Snapshot", requests: "Requests") -> "Requests":
+    def ask(snapshot: "Snapshot", requests: Requests) -> Requests:
         elapsed_s = snapshot.sample.time_s - begin_s + ROUNDING_S
         wanted_m = float(reference_m[int(np.searchsorted(time_s, time_s[0] + elapsed_s, side="right")) - 1])
         new = wanted_m != requests.reference_m or not requests.reference_writes

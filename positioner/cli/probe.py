@@ -1,6 +1,7 @@
 """`positioner probe`: looks at the valve without touching it."""
 
 import argparse
+import time
 from typing import TYPE_CHECKING
 
 from positioner.cli.parts.config_argument import add_config, config_file
@@ -26,7 +27,6 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
 def run(arguments: argparse.Namespace) -> int:
     """Print a line a second; exit status 1 when the last reading was not plausible."""
     import itertools
-    import time
 
     from config.daemon_file import load_daemon
     from drivers.boundary import DriverError
@@ -78,7 +78,6 @@ def watching_driver(file: "DaemonFile") -> "Driver":
 
 
 def _burst(driver: "Driver") -> tuple[list["Reading"], float]:
-    import time
 
     started_s = time.perf_counter()
     readings = [driver.read() for _ in range(BURST)]

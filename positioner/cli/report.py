@@ -4,6 +4,7 @@ import argparse
 from collections.abc import Sequence
 from pathlib import Path
 
+from config.errors import CommandFailed, InputError
 from positioner.cli.parts.config_argument import add_config, config_file
 from positioner.cli.parts.output_files import writable, write_text
 
@@ -28,7 +29,6 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
 def run(arguments: argparse.Namespace) -> int:
     """Write the report; 1 if nothing is kept."""
     from config.daemon_file import load_daemon
-    from config.errors import CommandFailed, InputError
     from positioner.history.kept_tests import records_folder
     from positioner.tests_on_the_valve.as_found_report import ValveReport, as_html, recommended_by, write_pdf
     from positioner.tests_on_the_valve.kept_records import records
@@ -54,13 +54,12 @@ def run(arguments: argparse.Namespace) -> int:
     return 0
 
 
-def _read_recommended(words: Sequence[str], kept: "Sequence[object]") -> dict[str, float]:
+def _read_recommended(words: Sequence[str], kept: Sequence[object]) -> dict[str, float]:
     """Return figures by name.
 
     Raises:
         InputError: a word is no figure of a test, or no number.
     """
-    from config.errors import InputError
     from positioner.tests_on_the_valve.kept_records import Record
 
     quantities = [each for record in kept if isinstance(record, Record) for each in record.outcome.quantities]

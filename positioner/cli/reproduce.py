@@ -6,6 +6,7 @@ In a clone of the project alone: `benchmarks/paper` prints them.
 import argparse
 from pathlib import Path
 
+from config.errors import InputError
 from positioner.cli.parts.clone_only import benchmark
 from positioner.cli.parts.output_files import make_folder, writable
 
@@ -22,7 +23,6 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
 
 def run(arguments: argparse.Namespace) -> int:
     """Run it; exit status 1 when a claim does not hold without noise, or a printed form is no worse than ours."""
-    from config.errors import InputError
 
     if arguments.seeds < 2:
         raise InputError("--seeds", f"must be at least 2, it is {arguments.seeds}")

@@ -5,6 +5,7 @@ from pathlib import Path
 
 from positioner.cli.parts.export_arguments import add_export_arguments, read_any
 from positioner.cli.parts.output_files import writable, write_json
+from positioner.cli.parts.progress import at_work
 
 HELP = "print dead time, T63, T86, dead band and so on of a recording; exit status 1 if it holds no step"
 EXAMPLE = "positioner response rec.csv --json figures.json"
@@ -22,7 +23,6 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
 def run(arguments: argparse.Namespace) -> int:
     """Print the figures; 0 if there is a step, else 1."""
 
-    from positioner.cli.parts.progress import at_work
     from positioner.response import as_json, respond
 
     writable(arguments.json, "--json")

@@ -2,6 +2,8 @@
 
 import argparse
 
+from config.codes import Mode
+from config.errors import InputError
 from positioner.cli.parts.daemon_address import add_connection, connect_dcs
 
 HELP = "write a register of a running daemon"
@@ -24,8 +26,6 @@ def run(arguments: argparse.Namespace) -> int:
 
 
 def _number(name: str, text: str) -> float:
-    from config.codes import Mode
-    from config.errors import InputError
 
     if name == "mode" and text.upper() in Mode.__members__:
         return Mode[text.upper()]

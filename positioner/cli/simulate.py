@@ -3,6 +3,11 @@
 import argparse
 from pathlib import Path
 
+from positioner.cli.parts.model_arguments import read_valve
+from positioner.cli.parts.naming import naming
+from positioner.cli.parts.output_files import recording_writable
+from positioner.cli.parts.progress import at_work
+
 HELP = "simulate the stem under a series of pressures, without a controller"
 EXAMPLE = "positioner simulate seed.toml --input pressure.csv --noise-m 1e-5 -o answer.csv"
 
@@ -26,10 +31,6 @@ def run(arguments: argparse.Namespace) -> int:
     """Simulate from rest at position 0 without pressure, and write the recording."""
     from config.valve_file import find_valve
     from positioner.cli.parts.csv_series import read_series
-    from positioner.cli.parts.model_arguments import read_valve
-    from positioner.cli.parts.naming import naming
-    from positioner.cli.parts.output_files import recording_writable
-    from positioner.cli.parts.progress import at_work
     from sim.effect import find_effect
     from sim.simulation import simulate
 

@@ -2,6 +2,7 @@
 
 import argparse
 
+from config.errors import CommandFailed, InputError
 from positioner.cli.parts.valve_test import (
     add_test_arguments,
     bounds_of,
@@ -33,7 +34,6 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
 
 def run(arguments: argparse.Namespace) -> int:
     """Step, print dead band, resolution and times; 0 if both are bracketed, else 1."""
-    from config.errors import CommandFailed, InputError
     from positioner.cli.parts.experiment_player import RunningValve, require_ready
     from positioner.tests_on_the_valve.small_steps import TEST, SmallSteps, programme, small_steps
 

@@ -3,6 +3,11 @@
 import argparse
 from pathlib import Path
 
+from config.errors import InputError
+from positioner.cli.parts.model_arguments import read_valve, require_parameters
+from positioner.cli.parts.naming import naming
+from positioner.cli.parts.output_files import writable
+
 HELP = "write a valve file from a data sheet; prints what it assumes"
 EXAMPLE = "positioner valve --area-cm2 700 --range-bar 0.2 1.0 --stroke-mm 40 -o v.toml"
 
@@ -43,8 +48,6 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
 
 def run(arguments: argparse.Namespace) -> int:
     """Write the file and print what it rests on."""
-    from config.errors import InputError
-    from positioner.cli.parts.output_files import writable
 
     writable(arguments.out, "-o")
     sheet = {key: getattr(arguments, key) for key in SHEET}
@@ -70,7 +73,6 @@ def _option(key: str) -> str:
 def _change_file(arguments: argparse.Namespace) -> int:
     from config.valve_changes import change_valve
     from config.writing import write_valve
-    from positioner.cli.parts.model_arguments import read_valve, require_parameters
 
     values = dict(map(_read_assignment, arguments.set))
     file = change_valve(read_valve(arguments.of), values, arguments.without)
@@ -87,7 +89,6 @@ def _read_assignment(text: str) -> tuple[str, float]:
     Raises:
         InputError: it is no assignment of a number.
     """
-    from config.errors import InputError
 
     name, _, value = text.partition("=")
     try:
@@ -99,7 +100,6 @@ def _read_assignment(text: str) -> tuple[str, float]:
 def _from_data_sheet(arguments: argparse.Namespace) -> int:
     from config.data_sheet import DataSheet, from_data_sheet
     from config.writing import write_valve
-    from positioner.cli.parts.naming import naming
 
     keys = (*SHEET, "name")
     with naming({key: _option(key) for key in keys}):

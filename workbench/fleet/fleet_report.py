@@ -6,6 +6,7 @@ leads; for a valve without one it has the command that makes it.
 
 from collections.abc import Mapping
 from html import escape
+from math import log
 from os.path import relpath
 from pathlib import Path
 
@@ -118,7 +119,6 @@ def sparkline(course: ValveCourse) -> Html:
 
 
 def _height(found: Examination) -> float:
-    from math import log
 
     ratio = (found.error_before_m or 0.0) / found.floor_m if found.floor_m else MOST_RATIO
     share = log(min(max(ratio, LEAST_RATIO), MOST_RATIO)) / log(MOST_RATIO)

@@ -3,6 +3,8 @@
 import argparse
 from pathlib import Path
 
+from config.errors import InputError
+
 METAVAR = "CONFIG.toml"
 
 
@@ -41,7 +43,6 @@ def config_file(arguments: argparse.Namespace) -> Path:
     Raises:
         InputError: there is none, or more than one.
     """
-    from config.errors import InputError
 
     said = config_files(arguments)
     if len(said) != 1:

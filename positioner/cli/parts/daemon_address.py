@@ -5,6 +5,8 @@ from collections.abc import Callable
 from pathlib import Path
 from typing import TYPE_CHECKING
 
+from config.errors import InputError
+
 if TYPE_CHECKING:
     from config.tls_table import Tls
     from positioner.dcs import Dcs
@@ -49,7 +51,6 @@ def connect_dcs(arguments: argparse.Namespace) -> "Dcs":
         InputError: a fault in the daemon's file, or a valve is named without it; or that file asks for certificates.
     """
     from config.daemon_file import SupervisoryTable, load_daemon
-    from config.errors import InputError
     from positioner.dcs import Dcs
 
     if arguments.valve is not None and arguments.config is None:

@@ -1,16 +1,17 @@
 """`positioner diagnose` on a bench's recording or a static curve: the balance of forces in place of a simulation."""
 
 import argparse
+import time
+
+from config.errors import InputError
+from positioner.cli.parts.model_arguments import read_valve
+from positioner.cli.parts.naming import naming
+from positioner.cli.parts.output_files import write_json
 
 
 def run_forces(arguments: argparse.Namespace) -> int:
     """Diagnose the balance of forces and print; 0 if nothing is missing, else 1."""
-    import time
 
-    from config.errors import InputError
-    from positioner.cli.parts.model_arguments import read_valve
-    from positioner.cli.parts.naming import naming
-    from positioner.cli.parts.output_files import write_json
     from workbench.data.imposed_motion import read_imposed
     from workbench.forces.force_diagnosis import diagnose_forces
     from workbench.forces.force_diagnosis_json import as_json

@@ -7,11 +7,13 @@ from contextlib import contextmanager
 from pathlib import Path
 from typing import TYPE_CHECKING
 
+from config.codes import ExperimentState, Fault, Mode, State
+from config.errors import CommandFailed, InputError
+from config.recorder_files import files_of
 from config.recording import Recording
 from positioner.cli.parts.daemon_address import connect_dcs
 
 if TYPE_CHECKING:
-    from config.codes import ExperimentState
     from config.daemon_file import DaemonFile
     from positioner.dcs import Dcs
     from positioner.tests_on_the_valve.program import Played as PlayedProgram
@@ -39,8 +41,6 @@ def require_ready(file: "DaemonFile", arguments: argparse.Namespace) -> None:
         InputError: no recorder in the file, or its folder is not on this machine.
         CommandFailed: no daemon, another mode, no consent, a veto, or the stem elsewhere; says what to do.
     """
-    from config.codes import ExperimentState, Mode
-    from config.errors import CommandFailed, InputError
 
     if file.recorder is None:
         raise InputError(str(arguments.config), "recorder: is needed, for experiments are read from its recordings")
@@ -107,7 +107,6 @@ class RunningValve:
 
     def play(self, program: "Program") -> "PlayedProgram":
         """Play a program and return what the daemon's recorder has of it."""
-        from config.codes import ExperimentState
         from positioner.tests_on_the_valve.program import Played
 
         within_s = 2.0 * self._file.experiment.limit_s + RECORDED_WITHIN_S
@@ -126,7 +125,6 @@ class RunningValve:
 
 def player_on(file: "DaemonFile", arguments: argparse.Namespace) -> "Player":
     """Return what plays experiments on the daemon's valve."""
-    from config.codes import ExperimentState
     from positioner.tests_on_the_valve.program import Program
     from workbench.discriminate.discrimination import Played
 
@@ -150,9 +148,8 @@ def wait_until_landed(dcs: "Dcs") -> None:
             command_pa, since = now_pa, dcs.get("cycles")
 
 
-def why_not(state: "ExperimentState", dcs: "Dcs") -> str:
+def why_not(state: ExperimentState, dcs: "Dcs") -> str:
     """Say why an experiment was not played to its end; of a fault, which."""
-    from config.codes import ExperimentState, Fault
 
     fault = Fault(int(dcs.get("fault"))) if state is ExperimentState.FAULT else Fault.NONE
     return state.text if fault is Fault.NONE else f"fault: {fault.text}"
@@ -185,8 +182,6 @@ def last_excited(folder: Path, valve: str) -> Recording | None:
     """Return the last stretch in S3 of the newest recordings, once something follows it; None before."""
     import numpy as np
 
-    from config.codes import State
-    from config.recorder_files import files_of
     from workbench.data.held_out import join_recordings
 
     newest = files_of(folder, valve)[-LATEST_FILES:]
@@ -232,7 +227,6 @@ def is_of(recording: Recording, points: tuple[tuple[float, float], ...]) -> bool
 
 def _read(path: Path) -> Recording | None:
     """Read a recording; None for one without a row yet."""
-    from config.errors import InputError
 
     try:
         return Recording.read(path)

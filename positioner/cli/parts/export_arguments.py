@@ -2,14 +2,17 @@
 
 import argparse
 import sys
+from dataclasses import replace
 from math import isfinite, nan
 from pathlib import Path
 from typing import TYPE_CHECKING
 
+from config.errors import InputError
+from positioner.cli.parts.progress import at_work
+
 if TYPE_CHECKING:
     from collections.abc import Callable
 
-    from config.errors import InputError
     from config.recording import Recording
     from workbench.imports.column_mapping import ExportOptions
 
@@ -129,9 +132,7 @@ def read_any(path: Path, arguments: argparse.Namespace, stroke_m: float | None) 
         InputError: as `Recording.read` and `read_export`; an option that goes with columns without any; a stretch
             without samples.
     """
-    from config.errors import InputError
     from config.recording import Recording
-    from positioner.cli.parts.progress import at_work
 
     take_mapping(arguments)
     size = f", {path.stat().st_size / 1e6:.0f} MB" if path.is_file() and path.stat().st_size > LARGE_FILE_BYTES else ""
@@ -154,13 +155,12 @@ def read_any(path: Path, arguments: argparse.Namespace, stroke_m: float | None) 
     return _stretch(recording, arguments)
 
 
-def _refuse_loop(path: Path, error: "InputError") -> None:
+def _refuse_loop(path: Path, error: InputError) -> None:
     """Say of a file that lacks our columns that it is a control loop's, where it is.
 
     Raises:
         InputError: it is; names the command that reads it.
     """
-    from config.errors import InputError
     from workbench.imports.export_preview import preview
 
     if "is missing" not in error.problem:
@@ -177,9 +177,6 @@ def _refuse_loop(path: Path, error: "InputError") -> None:
 
 def _stretch(recording: "Recording", arguments: argparse.Namespace) -> "Recording":
     """Return the stretch of a recording that is asked for, its clock as it was."""
-    from dataclasses import replace
-
-    from config.errors import InputError
 
     if arguments.from_s is None and arguments.to_s is None:
         return recording
@@ -206,7 +203,6 @@ def read_mapped(
     Raises:
         InputError: as `read_export`; a stroke that is not positive.
     """
-    from config.errors import InputError
     from workbench.imports.column_mapping import read_mapping
     from workbench.imports.historian_export import read_export
 

@@ -2,6 +2,8 @@
 
 from typing import TYPE_CHECKING
 
+from config.errors import InputError
+
 if TYPE_CHECKING:
     from config.daemon_file import DaemonFile
     from config.extended_valve import ExtendedValve
@@ -19,7 +21,6 @@ def load_extended_valve(file: "DaemonFile", source: str) -> "ExtendedValve | Non
     """
     if file.law is None or file.law.valve is None:
         return None
-    from config.errors import InputError
     from config.valve_file import load_valve
     from sim.static_inverse import extended_valve
 

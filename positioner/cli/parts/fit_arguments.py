@@ -9,6 +9,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING
 
 from positioner.cli.parts.export_arguments import add_export_arguments, read_any
+from positioner.cli.parts.naming import naming
 
 if TYPE_CHECKING:
     from config.recording import Recording
@@ -48,7 +49,6 @@ def read_fitted(
 
 def read_with_noise(path: Path, arguments: argparse.Namespace, valve: "ValveFile") -> "Recording":
     """Return one of them; raises as `read_fitted`."""
-    from positioner.cli.parts.naming import naming
     from workbench.data.noise_floor import with_noise
 
     recording = read_any(path, arguments, valve.valve.stroke_m)

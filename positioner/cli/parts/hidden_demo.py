@@ -15,6 +15,8 @@ from pathlib import Path
 from statistics import fmean
 from typing import TYPE_CHECKING
 
+from config.codes import Fault
+from config.errors import CommandFailed
 from positioner.cli.parts.children import port_in
 from positioner.cli.parts.demo_folder import recording_in
 from positioner.cli.parts.output_files import write_json
@@ -100,8 +102,6 @@ def run_hidden(bus: str, folder: Path, told: Path | None) -> int:
 
 def _steps(recordings: str, folder: Path, setup: BusSetup, slave: str, law: str = "") -> list[float]:
     """Let a daemon make the steps; return their errors, of the stroke. Where it has no law yet it identifies first."""
-    from config.codes import Fault
-    from config.errors import CommandFailed
     from positioner.dcs import Dcs
 
     tables = DAEMON.format(recordings=recordings) + law

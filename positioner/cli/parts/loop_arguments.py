@@ -4,6 +4,8 @@ import argparse
 from pathlib import Path
 from typing import TYPE_CHECKING
 
+from config.errors import InputError
+
 if TYPE_CHECKING:
     from workbench.loops.loop_record import LoopRecord
 
@@ -37,7 +39,6 @@ def read_record(path: Path, arguments: argparse.Namespace) -> "LoopRecord":
     Raises:
         InputError: as `read_loop`; a range without width.
     """
-    from config.errors import InputError
     from workbench.imports.loop_reader import ROLES, read_loop
     from workbench.loops.loop_record import LoopRecord
 

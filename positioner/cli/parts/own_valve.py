@@ -6,6 +6,10 @@ from contextlib import ExitStack, contextmanager
 from pathlib import Path
 from typing import TYPE_CHECKING
 
+from config.codes import Mode
+from config.errors import CommandFailed
+from positioner.control.requests import ExperimentRequest, Requests
+
 if TYPE_CHECKING:
     from config.daemon_file import DaemonFile
     from positioner.tests_on_the_valve.own_cycle import OwnCycle
@@ -33,12 +37,9 @@ def own_valve(file: "DaemonFile", source: Path) -> "Iterator[OwnCycle]":
     Raises:
         CommandFailed: a daemon serves it, or its device is not there.
     """
-    from config.codes import Mode
-    from config.errors import CommandFailed
     from drivers import driver_for
     from drivers.boundary import DriverError
     from positioner.control.controller import Controller
-    from positioner.control.requests import ExperimentRequest, Requests
     from positioner.control.settings import Settings
     from positioner.daemon.cycle import Cycle
     from positioner.daemon.kept_alone import keep_alone
@@ -71,7 +72,6 @@ def require_no_daemon(file: "DaemonFile") -> None:
     Raises:
         CommandFailed: one answers there.
     """
-    from config.errors import CommandFailed
 
     where = file.supervisory
     if where.port == 0:

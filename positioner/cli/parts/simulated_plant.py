@@ -10,6 +10,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING
 
 from positioner.cli.parts.children import port_in, running
+from positioner.cli.parts.pseudo_line import pseudo_line
 
 if TYPE_CHECKING:
     from config.valve_file import ValveParameters
@@ -64,7 +65,6 @@ def _canopen() -> Iterator[BusSetup]:
 
 @contextmanager
 def _rtu() -> Iterator[BusSetup]:
-    from positioner.cli.parts.pseudo_line import pseudo_line
 
     def serial(path: str) -> str:
         return f'serial = {{path = "{path}", baud = 115200}}\n'

@@ -1,18 +1,25 @@
 """What the commands of tests on the valve share: their options, the running valve, what becomes of an outcome."""
 
 import argparse
+import sys
+import time
 from collections.abc import Iterator, Sequence
 from contextlib import contextmanager
+from dataclasses import replace
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
+from config.codes import ValveTestVerdict
+from config.drive import Kind, as_written
+from config.errors import CommandFailed, InputError
+from config.results.block import as_text
+from positioner.cli.parts.breaking_off import end_as_by_ctrl_c
 from positioner.cli.parts.config_argument import add_config, config_files
 from positioner.cli.parts.daemon_address import add_tls
 from positioner.cli.parts.output_files import writable, write_json
 
 if TYPE_CHECKING:
     from config.daemon_file import DaemonFile
-    from config.drive import Kind
     from config.recording import Recording
     from positioner.control.played_experiment import ExperimentLimits
     from positioner.tests_on_the_valve.kept_records import Record
@@ -56,7 +63,6 @@ def checked(arguments: argparse.Namespace) -> "DaemonFile | None":
         InputError: no file where one is needed, a number that cannot be, an output that cannot be written.
     """
     from config.daemon_file import load_daemon
-    from config.errors import InputError
 
     writable(arguments.json, "--json")
     writable(arguments.picture, "--picture")
@@ -96,7 +102,6 @@ def require_whole_travel(file: "DaemonFile", test: str, config: Path) -> None:
     Raises:
         InputError: says what to write.
     """
-    from config.errors import InputError
 
     low, high = file.experiment.travel_window
     if low > 0.0 or high < 1.0:
@@ -105,7 +110,6 @@ def require_whole_travel(file: "DaemonFile", test: str, config: Path) -> None:
 
 def played_all(player: "Player", programs: "tuple[Program, ...]") -> "list[Played]":
     """Play programs one after another until one does not come to its end; say what goes on."""
-    import sys
 
     played = []
     for number, program in enumerate(programs, start=1):
@@ -124,9 +128,6 @@ def playing(test: str, file: "DaemonFile", arguments: argparse.Namespace) -> Ite
     Raises:
         KeyboardInterrupt, CommandFailed: what broke it off.
     """
-    from config.codes import ValveTestVerdict
-    from config.errors import CommandFailed
-    from positioner.cli.parts.breaking_off import end_as_by_ctrl_c
     from positioner.tests_on_the_valve.outcome import Outcome
 
     with end_as_by_ctrl_c():
@@ -152,7 +153,6 @@ def reference_of(test: str, file: "DaemonFile", arguments: argparse.Namespace) -
 
 def trend_of(test: str, names: Sequence[str], file: "DaemonFile", arguments: argparse.Namespace) -> str:
     """Return the last tests of this kind as text, a row each."""
-    from config.results.block import as_text
     from positioner.history.kept_tests import records_folder
     from positioner.tests_on_the_valve.kept_records import records, trend
 
@@ -165,7 +165,6 @@ def recordings_of(played: "list[Played]") -> "list[Recording]":
     Raises:
         CommandFailed: something was broken off; says by what.
     """
-    from config.errors import CommandFailed
 
     for each in played:
         if each.problem or each.recording is None:
@@ -205,9 +204,7 @@ def finished(
 
 
 def _compared(outcome: "Outcome", before: "Record | None") -> "tuple[Outcome, list[Any]]":
-    from dataclasses import replace
 
-    from config.codes import ValveTestVerdict
     from positioner.tests_on_the_valve.kept_records import change_table, changes, meaning_table
 
     if before is None:
@@ -226,7 +223,6 @@ def _compared(outcome: "Outcome", before: "Record | None") -> "tuple[Outcome, li
 
 def kept(outcome: "Outcome", file: "DaemonFile", arguments: argparse.Namespace, kind: str) -> Path:
     """Keep an outcome as a kind, with what was configured, and return its file."""
-    import time
 
     from positioner.history.kept_tests import records_folder
     from positioner.tests_on_the_valve.kept_records import keep
@@ -242,8 +238,7 @@ def configured(file: "DaemonFile") -> dict[str, Any]:
     return {name: _as_written(file.valve.kind, table) for name, table in tables.items()}
 
 
-def _as_written(kind: "Kind", table: Any) -> Any:
-    from config.drive import as_written
+def _as_written(kind: Kind, table: Any) -> Any:
 
     if not isinstance(table, dict):
         return table
@@ -257,7 +252,6 @@ def draw(outcome: "Outcome", path: Path) -> None:
     Raises:
         InputError: it cannot be written, or it is named as no picture is.
     """
-    from config.errors import InputError
 
     try:
         outcome.plot().savefig(path)
