@@ -1,6 +1,7 @@
 """Errors for people: each is a single line, of bounded length, whatever it quotes of a file or a library."""
 
-from collections.abc import Mapping
+from collections.abc import Iterator, Mapping
+from contextlib import contextmanager
 
 PROBLEM_CHARACTERS = 2000
 """Characters of a problem; what stands in its middle beyond that is left out."""
@@ -45,6 +46,24 @@ class InputError(Exception):
     def __reduce__(self) -> tuple[type["InputError"], tuple[str, str]]:
         """Pass between processes, as what a worker could not do is told by another."""
         return type(self), (self.source, self.problem)
+
+
+@contextmanager
+def explain_failure(source: object, problem: str) -> Iterator[None]:
+    """Name a file, a folder or an address when what is done with it fails, the problem, and the system's reason.
+
+    >>> with explain_failure("site.toml", "cannot be read"):
+    ...     open("no/such/file")
+    Traceback (most recent call last):
+    config.errors.InputError: site.toml: cannot be read: No such file or directory
+
+    Raises:
+        InputError: the system refused it (`OSError`).
+    """
+    try:
+        yield
+    except OSError as error:
+        raise InputError(str(source), f"{problem}: {error.strerror or error}") from None
 
 
 class CommandFailed(Exception):

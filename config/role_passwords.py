@@ -3,7 +3,7 @@
 import json
 from pathlib import Path
 
-from config.errors import InputError
+from config.errors import InputError, explain_failure
 from config.passwords import Password
 from config.roles import Role
 from config.whole_file import replace_whole
@@ -50,9 +50,7 @@ def set_password(file: Path, role: str, text: str) -> None:
     kept = read_passwords(file) if file.exists() else {}
     kept[role] = Password.of(text)
     told = {name: {"salt": each.salt.hex(), "digest": each.digest.hex()} for name, each in sorted(kept.items())}
-    try:
+    with explain_failure(file, "cannot be written"):
         file.touch(OWN_ALONE)
         replace_whole(file, json.dumps(told, indent=1) + "\n")
         file.chmod(OWN_ALONE)
-    except OSError as error:
-        raise InputError(str(file), f"cannot be written: {error.strerror}") from None

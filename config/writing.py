@@ -8,7 +8,7 @@ from typing import Any
 
 from config.arguments import kinds_held
 from config.drive import VALVE
-from config.errors import InputError
+from config.errors import explain_failure
 from config.valve_file import EffectTable, ValveFile
 from config.whole_file import beside
 
@@ -23,11 +23,8 @@ def write_valve(path: Path | str, file: ValveFile, remarks: Sequence[str] = ()) 
     path = Path(path)
     seen = file.model_copy(update={"effect": tuple(_relative_to(path.parent, each) for each in file.effect)})
     text = "".join(f"# {remark}\n" for remark in remarks) + valve_toml(seen)
-    try:
-        with beside(path) as new:
-            new.write_text(text, encoding="utf-8")
-    except OSError as error:
-        raise InputError(str(path), f"cannot be written: {error.strerror}") from None
+    with explain_failure(path, "cannot be written"), beside(path) as new:
+        new.write_text(text, encoding="utf-8")
 
 
 def valve_toml(file: ValveFile) -> str:

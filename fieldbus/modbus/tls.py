@@ -16,7 +16,7 @@ import time
 from datetime import datetime
 from pathlib import Path
 
-from config.errors import InputError
+from config.errors import InputError, explain_failure
 from config.tls_table import Tls
 from fieldbus.modbus.client_roles import Identity, Writers, authorize, identity_in
 
@@ -228,11 +228,8 @@ def _context(tls: Tls, protocol: int) -> ssl.SSLContext:
 
 
 def _require_readable(file: Path) -> None:
-    try:
-        with file.open("rb"):
-            pass
-    except OSError as error:
-        raise InputError(str(file), f"cannot be read: {error.strerror}") from None
+    with explain_failure(file, "cannot be read"), file.open("rb"):
+        pass
 
 
 def _require_cryptography(tls: Tls) -> None:

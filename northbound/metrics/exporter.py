@@ -13,7 +13,7 @@ from prometheus_client import CollectorRegistry, start_http_server
 from prometheus_client.core import CounterMetricFamily, GaugeMetricFamily, HistogramMetricFamily, Metric
 from prometheus_client.registry import Collector
 
-from config.errors import InputError
+from config.errors import explain_failure
 from northbound.metrics.scraped_valve import ScrapedValve
 from northbound.metrics.valve_metrics import SPACE, Gauge, Histogram, metrics
 
@@ -61,10 +61,8 @@ def serve_metrics(valves: Sequence[ScrapedValve], host: str, port: int) -> int:
     """
     registry = CollectorRegistry()
     registry.register(ValveCollector(valves))
-    try:
+    with explain_failure(f"{host}:{port}", "cannot listen there"):
         server, _ = start_http_server(port, host, registry)
-    except OSError as error:
-        raise InputError(f"{host}:{port}", f"cannot listen there: {error.strerror or error}") from None
     return int(server.server_port)
 
 

@@ -20,7 +20,7 @@ from cryptography.hazmat.primitives.asymmetric import rsa
 from cryptography.hazmat.primitives.serialization import Encoding, load_pem_private_key
 from cryptography.x509.oid import ExtendedKeyUsageOID, NameOID
 
-from config.errors import InputError
+from config.errors import InputError, explain_failure
 
 OWN_DAYS = 1825
 LEAST_BITS = 2048
@@ -53,13 +53,11 @@ class ApplicationKeys:
         self.trusted, self.rejected = folder / "trusted", folder / "rejected"
         self.made = False
         """Whether the certificate was made just now."""
-        try:
+        with explain_failure(folder, "cannot be written"):
             for each in (self.trusted, self.rejected):
                 each.mkdir(parents=True, exist_ok=True)
             if not self.certificate.exists() and not self.key.exists():
                 self._make(uri, host)
-        except OSError as error:
-            raise InputError(str(folder), f"cannot be written: {error.strerror}") from None
         self.own = self._own()
 
     def refusal(self, certificate: x509.Certificate) -> Refusal | None:
@@ -141,10 +139,8 @@ def _read(path: Path) -> x509.Certificate:
     Raises:
         InputError: it cannot be read, or is none.
     """
-    try:
+    with explain_failure(path, "cannot be read"):
         content = path.read_bytes()
-    except OSError as error:
-        raise InputError(str(path), f"cannot be read: {error.strerror}") from None
     try:
         pem = content.lstrip().startswith(b"-----")
         return x509.load_pem_x509_certificate(content) if pem else x509.load_der_x509_certificate(content)

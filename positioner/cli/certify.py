@@ -4,7 +4,7 @@ import argparse
 from pathlib import Path
 from typing import TYPE_CHECKING
 
-from config.errors import InputError
+from config.errors import InputError, explain_failure
 from positioner.cli.parts.config_argument import add_config, config_file
 
 if TYPE_CHECKING:
@@ -49,10 +49,8 @@ def _certificate(file: "DaemonFile", folder: Path) -> "Certificate | Refused":
     if file.memory.folder is None:
         raise InputError("memory.folder", "is required: what is known of the valve is read there")
     path = memory_path(folder / file.memory.folder, file.valve.name)
-    try:
+    with explain_failure(path, "cannot be read"):
         kept = look_at(path, file.valve.name, conditions_of(file))
-    except OSError as error:
-        raise InputError(str(path), f"cannot be read: {error.strerror}") from None
     if kept.knowledge is None:
         raise InputError(str(path), kept.problem or "nothing is known of the valve yet: identify it first")
     bounds = SlideSettings.of(file)

@@ -4,7 +4,7 @@ import argparse
 from collections.abc import Sequence
 from pathlib import Path
 
-from config.errors import CommandFailed, InputError
+from config.errors import CommandFailed, InputError, explain_failure
 from positioner.cli.parts.config_argument import add_config, config_file
 from positioner.cli.parts.output_files import writable, write_text
 
@@ -44,10 +44,8 @@ def run(arguments: argparse.Namespace) -> int:
         raise CommandFailed(f"nothing is kept in {folder}: a test with --keep as_found or as_left keeps it")
     report = ValveReport(file.valve.name, kept, _read_recommended(arguments.recommended, kept), recommended_by(file))
     if arguments.out.suffix.lower() == ".pdf":
-        try:
+        with explain_failure(f"-o {arguments.out}", "cannot be written"):
             write_pdf(report, arguments.out)
-        except OSError as error:
-            raise InputError(f"-o {arguments.out}", f"cannot be written: {error.strerror}") from None
     else:
         write_text(arguments.out, as_html(report), "-o")
     print(f"{arguments.out}: {', '.join(report.tests())} of {file.valve.name}")

@@ -5,7 +5,7 @@ from contextlib import ExitStack
 from pathlib import Path
 
 from config.daemon_file import DaemonFile
-from config.errors import InputError
+from config.errors import explain_failure
 from config.lock_file import take_lock
 from positioner.daemon.health.health_keeper import health_path
 from positioner.daemon.memory.memory_keeper import memory_path
@@ -24,9 +24,7 @@ def keep_alone(file: DaemonFile, beside: Path, on_exit: ExitStack) -> None:
     """
     kept = ((file.health.folder, health_path), (file.memory.folder, memory_path))
     for path in (path_of(beside / folder, file.valve.name) for folder, path_of in kept if folder is not None):
-        try:
+        with explain_failure(path, "cannot be kept there"):
             path.parent.mkdir(parents=True, exist_ok=True)
             lock = take_lock(path.with_name(f"{path.name}.lock"), f"another daemon keeps {path.name} there")
-        except OSError as error:
-            raise InputError(str(path), f"cannot be kept there: {error.strerror}") from None
         on_exit.callback(os.close, lock)

@@ -23,7 +23,7 @@ from typing import Protocol
 
 from config.drive import COLUMNS as OF_KIND
 from config.drive import VALVE, Kind
-from config.errors import InputError
+from config.errors import explain_failure
 from config.file_stem import file_stem
 from config.recorder_files import COLUMNS, files_of_stem, find_compressed_twins, number_of
 from positioner.daemon.logs import log_event
@@ -101,11 +101,9 @@ class Recorder:
         Raises:
             InputError: the folder cannot be written.
         """
-        try:
+        with explain_failure(self._folder, "recordings cannot be written there"):
             self._folder.mkdir(parents=True, exist_ok=True)
             self._open_next()
-        except OSError as error:
-            raise InputError(str(self._folder), f"recordings cannot be written there: {error.strerror}") from None
         self._thread.start()
 
     def offer(self, row: Row) -> None:

@@ -15,7 +15,7 @@ from dataclasses import astuple, fields
 from pathlib import Path
 from typing import Any
 
-from config.errors import InputError
+from config.errors import InputError, explain_failure
 from config.lock_file import take_lock
 from positioner.history.entries import TABLES, Entry, Event, Setting
 
@@ -68,11 +68,9 @@ class HistoryFile:
             except sqlite3.Error as error:
                 raise InputError(str(self.path), f"the history cannot be kept there: {error}") from None
             return
-        try:
+        with explain_failure(folder, "the history cannot be kept there"):
             folder.mkdir(parents=True, exist_ok=True)
             self._lock = take_lock(folder / f"{FILE_NAME}.lock", "another daemon keeps its history there")
-        except OSError as error:
-            raise InputError(str(folder), f"the history cannot be kept there: {error.strerror}") from None
         try:
             self._connection = self._open_file()
         except BaseException:
@@ -200,11 +198,8 @@ def require_ours(path: Path) -> None:
     Raises:
         InputError: it is not ours, or cannot be read.
     """
-    try:
-        with path.open("rb") as file:
-            head = file.read(100)
-    except OSError as error:
-        raise InputError(str(path), f"cannot be read: {error.strerror}") from None
+    with explain_failure(path, "cannot be read"), path.open("rb") as file:
+        head = file.read(100)
     if not head.startswith(b"SQLite format 3\0") or int.from_bytes(head[68:72]) != APPLICATION:
         raise InputError(str(path), "is not a history of this program")
     if (version := int.from_bytes(head[60:64])) != VERSION:

@@ -21,7 +21,7 @@ from typing import Any
 import numpy as np
 
 from config.drive import ROTARY
-from config.errors import InputError
+from config.errors import InputError, explain_failure
 from config.json_value import json_value
 from config.results.block import Table
 from config.whole_file import replace_whole
@@ -151,11 +151,9 @@ def keep(folder: Path, outcome: Outcome, kind: str, time_s: float, configuration
         else {"x": picture.x, "y": picture.y, "curves": [_kept_curve(each) for each in picture.curves]},
         "configuration": configuration,
     }
-    try:
+    with explain_failure(path, "cannot be written"):
         folder.mkdir(parents=True, exist_ok=True)
         replace_whole(path, json.dumps(json_value(told), allow_nan=False, default=str) + "\n")
-    except OSError as error:
-        raise InputError(str(path), f"cannot be written: {error.strerror}") from None
     return path
 
 

@@ -14,7 +14,7 @@ from math import inf
 from pathlib import Path
 from uuid import UUID
 
-from config.errors import CommandFailed, InputError
+from config.errors import CommandFailed, InputError, explain_failure
 from sim.composition import BASE, Composition
 from sim.fmu.kernel_object import kernel_object
 from sim.fmu.model_description import ABOVE_ZERO, IDENTIFIER, Variable, model_description, variables
@@ -51,10 +51,8 @@ def export_fmu(composition: Composition, path: Path) -> None:
     with zipfile.ZipFile(whole, "w") as unit:
         _put(unit, "modelDescription.xml", model_description(composition, guid, tool))
         _put(unit, f"binaries/{PLATFORM}/{IDENTIFIER}.so", library)
-    try:
+    with explain_failure(path, "cannot be written"):
         path.write_bytes(whole.getvalue())
-    except OSError as error:
-        raise InputError(str(path), f"cannot be written: {error.strerror}") from None
 
 
 def _put(unit: zipfile.ZipFile, name: str, content: bytes) -> None:

@@ -9,7 +9,7 @@ import logging
 import time
 from threading import Event, Thread
 
-from config.errors import InputError
+from config.errors import explain_failure
 from config.serial_port import SerialPort
 from fieldbus.modbus.register_answers import RegisterAnswers, Registers
 from fieldbus.modbus.rtu import BROADCAST, ECHO, LARGEST_FRAME, framed, is_whole
@@ -47,10 +47,8 @@ class RtuServer(RegisterAnswers):
         Raises:
             InputError: the line cannot be opened.
         """
-        try:
+        with explain_failure(self.address, "cannot listen there"):
             self._line.open()
-        except OSError as error:
-            raise InputError(self.address, f"cannot listen there: {error.strerror}") from None
         self._thread.start()
 
     def stop(self) -> None:

@@ -18,7 +18,7 @@ from typing import cast
 import numba
 import numpy as np
 
-from config.errors import InputError
+from config.errors import InputError, explain_failure
 from workbench.bench.drawn_loops import Simulate, draw_loops, simulate
 from workbench.blind.hiding import hide
 from workbench.blind.sealing import seal
@@ -50,13 +50,11 @@ def write_cases(folder: Path, drawn: int, effects: int, first_seed: int, labelle
     if (folder / CASES).exists():
         raise InputError(str(folder), f"holds {CASES} already")
     rows: list[tuple[str, ...]] = [] if labelled is None else list(_labelled(labelled))
-    try:
+    with explain_failure(folder, "cannot be written"):
         folder.mkdir(parents=True, exist_ok=True)
         rows += [*_drawn(folder, drawn, first_seed), *_hidden(folder, effects, first_seed)]
         with (folder / CASES).open("w", encoding="utf-8", newline="") as file:
             csv.writer(file).writerows([COLUMNS, *rows])
-    except OSError as error:
-        raise InputError(str(folder), f"cannot be written: {error.strerror}") from None
 
 
 def _drawn(folder: Path, count: int, first_seed: int) -> Iterator[tuple[str, ...]]:
@@ -101,11 +99,8 @@ def read_cases(folder: Path) -> list[Case]:
 
 
 def _rows(path: Path, columns: set[str]) -> list[dict[str, str]]:
-    try:
-        with path.open(encoding="utf-8", newline="") as file:
-            reader = csv.DictReader(file)
-            if lacks := columns - set(reader.fieldnames or ()):
-                raise InputError(str(path), f"lacks the columns {', '.join(sorted(lacks))}")
-            return list(reader)
-    except OSError as error:
-        raise InputError(str(path), f"cannot be read: {error.strerror}") from None
+    with explain_failure(path, "cannot be read"), path.open(encoding="utf-8", newline="") as file:
+        reader = csv.DictReader(file)
+        if lacks := columns - set(reader.fieldnames or ()):
+            raise InputError(str(path), f"lacks the columns {', '.join(sorted(lacks))}")
+        return list(reader)

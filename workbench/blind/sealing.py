@@ -17,7 +17,7 @@ from typing import Any, Literal, Self
 
 from pydantic import BaseModel, ConfigDict, FiniteFloat, ValidationError, model_validator
 
-from config.errors import CommandFailed, InputError
+from config.errors import CommandFailed, InputError, explain_failure
 from config.recording import write_recording
 from config.writing import valve_toml
 from workbench.blind.hiding import Hidden
@@ -70,7 +70,7 @@ def seal(folder: Path, hidden: Hidden) -> str:
     """
     if (folder / SEALED).exists():
         raise InputError(str(folder), "holds a sealed answer already; reveal it, or choose another folder")
-    try:
+    with explain_failure(folder, "cannot be written"):
         folder.mkdir(parents=True, exist_ok=True)
         write_recording(folder / "fit.csv", hidden.fit)
         write_recording(folder / "test.csv", hidden.test)
@@ -78,8 +78,6 @@ def seal(folder: Path, hidden: Hidden) -> str:
         text = json.dumps({**hidden.answer, "files": _digests(folder)})
         sealed = {"sha256": _sha256(text.encode()), "answer_base64": base64.b64encode(text.encode()).decode()}
         (folder / SEALED).write_text(json.dumps(sealed, indent=1) + "\n", encoding="utf-8")
-    except OSError as error:
-        raise InputError(str(folder), f"cannot be written: {error.strerror}") from None
     return sealed["sha256"]
 
 

@@ -13,7 +13,7 @@ from typing import Generic, TypeVar
 
 from pydantic import TypeAdapter
 
-from config.errors import InputError
+from config.errors import InputError, explain_failure
 from config.whole_file import replace_whole
 
 FORM = 1
@@ -32,12 +32,10 @@ class KeptResults(Generic[Kept]):
         self.folder = folder
         self._form: TypeAdapter[Kept] = TypeAdapter(kind)
         marker = folder / "fleet.json"
-        try:
+        with explain_failure(folder, "cannot be written"):
             (folder / "examinations").mkdir(parents=True, exist_ok=True)
             if not marker.exists():
                 replace_whole(marker, json.dumps({"form": FORM}) + "\n")
-        except OSError as error:
-            raise InputError(str(folder), f"cannot be written: {error.strerror}") from None
         _require_form(marker)
 
     def get(self, key: str) -> Kept | None:

@@ -7,7 +7,7 @@ in `reports/` under the fleet's folder by the content of what they are made of, 
 from collections.abc import Mapping
 from pathlib import Path
 
-from config.errors import InputError
+from config.errors import explain_failure
 from config.recording import Recording
 from config.writing import write_valve
 from workbench.diagnosis.diagnosis import diagnose
@@ -32,10 +32,8 @@ def write_diagnosis_reports(fleet: Fleet, out: Path, most: int) -> Mapping[str, 
         return {}
     folder = out / "reports"
     require_plotly(folder)
-    try:
+    with explain_failure(folder, "cannot be written"):
         folder.mkdir(exist_ok=True)
-    except OSError as error:
-        raise InputError(str(folder), f"cannot be written: {error.strerror}") from None
     found = {course.name: _report(course, fleet.folder, folder) for course in chosen[:most]}
     return {name: path for name, path in found.items() if path is not None}
 

@@ -15,7 +15,7 @@ from datetime import UTC, datetime
 from pathlib import Path
 from typing import Any
 
-from config.errors import InputError
+from config.errors import explain_failure
 from config.extras import import_extra
 from config.whole_file import beside
 from workbench.fleet.examination import AS_BEFORE, Examination, unreadable
@@ -126,11 +126,8 @@ def write_tables(courses: Sequence[ValveCourse], folder: Path) -> None:
         schema = arrow.schema(
             [arrow.field(each.name, _type(arrow, each, offset), metadata={"meaning": each.meaning}) for each in columns]
         )
-        try:
-            with beside(path) as new:
-                parquet.write_table(arrow.Table.from_pylist([_in_utc(row) for row in rows], schema), new)
-        except OSError as error:
-            raise InputError(str(path), f"cannot be written: {error.strerror or error}") from None
+        with explain_failure(path, "cannot be written"), beside(path) as new:
+            parquet.write_table(arrow.Table.from_pylist([_in_utc(row) for row in rows], schema), new)
 
 
 def valve_columns(courses: Sequence[ValveCourse]) -> dict[str, list[Any]]:

@@ -3,7 +3,7 @@
 from collections.abc import Callable
 from pathlib import Path
 
-from config.errors import InputError
+from config.errors import InputError, explain_failure
 from workbench.imports import line_protocol, measurement_files, text_table, typed_tables
 from workbench.imports.raw_table import RawTable
 
@@ -34,11 +34,8 @@ def raw_tables(path: Path, sheet: str | None = None) -> list[RawTable]:
     Raises:
         InputError: it cannot be read or is of no kind that holds a table; says what to do with it.
     """
-    try:
-        with path.open("rb") as file:
-            begin = file.read(BEGIN_BYTES)
-    except OSError as error:
-        raise InputError(str(path), f"cannot be read: {error.strerror or error}") from None
+    with explain_failure(path, "cannot be read"), path.open("rb") as file:
+        begin = file.read(BEGIN_BYTES)
     for magic, problem in REFUSED.items():
         if begin.startswith(magic):
             raise InputError(str(path), problem)

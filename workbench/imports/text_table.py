@@ -13,7 +13,7 @@ from functools import partial
 from itertools import islice
 from pathlib import Path
 
-from config.errors import InputError
+from config.errors import InputError, explain_failure
 from config.plain_file import MOST_COLUMNS
 from workbench.imports.labview_file import is_labview, labview_table
 from workbench.imports.raw_table import Cell, RawTable
@@ -118,10 +118,8 @@ def decode_text(path: Path) -> tuple[str, str]:
     Raises:
         InputError: it cannot be read, or is no text; names the line of a NUL character.
     """
-    try:
+    with explain_failure(path, "cannot be read"):
         data = path.read_bytes()
-    except OSError as error:
-        raise InputError(str(path), f"cannot be read: {error.strerror or error}") from None
     encoding = _encoding(data)
     try:
         text = data.decode(encoding)

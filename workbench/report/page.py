@@ -12,7 +12,7 @@ from pathlib import Path
 from string import Template
 from typing import Any, NewType
 
-from config.errors import InputError
+from config.errors import InputError, explain_failure
 from config.valve_file import ValveFile
 from config.whole_file import beside
 from workbench.report.units import Shown
@@ -89,11 +89,8 @@ def _write(path: Path, title: str, parts: Iterable[Html], library: str, script: 
         plotly=library,
         script=script,
     )
-    try:
-        with beside(path) as new:
-            new.write_text(page, encoding="utf-8", errors="backslashreplace")  # a file's name need not be text
-    except OSError as error:
-        raise InputError(str(path), f"cannot be written: {error.strerror}") from None
+    with explain_failure(path, "cannot be written"), beside(path) as new:
+        new.write_text(page, encoding="utf-8", errors="backslashreplace")  # a file's name need not be text
 
 
 def heading(title: str, subject: Subject, facts: str) -> Html:

@@ -12,7 +12,7 @@ from pathlib import Path
 from urllib.parse import quote
 
 from config.codes import Ne107Cause, Ne107Status
-from config.errors import InputError
+from config.errors import explain_failure
 from positioner.daemon.alarms.alarm_list import AlarmList
 from positioner.daemon.alarms.alarm_states import Alarm
 from positioner.daemon.health.health_file import (
@@ -56,12 +56,10 @@ class StoredHealth:
             InputError: the file cannot be read or written.
         """
         path = health_path(folder, valve)
-        try:
+        with explain_failure(path, "the health record cannot be kept there"):
             folder.mkdir(parents=True, exist_ok=True)
             kept = read_record(path, valve, scales)
             write_record(path, valve, kept.record, scales, kept.more)
-        except OSError as error:
-            raise InputError(str(path), f"the health record cannot be kept there: {error.strerror}") from None
         return cls(path, scales, kept)
 
 

@@ -12,7 +12,7 @@ from pathlib import Path
 from urllib.parse import quote
 
 from config.codes import Restored
-from config.errors import InputError
+from config.errors import explain_failure
 from positioner.control.controller_memory import Decision
 from positioner.control.valve_knowledge import ValveKnowledge
 from positioner.daemon.logs import log_event, logging_valve
@@ -46,11 +46,9 @@ class StoredMemory:
             InputError: the folder cannot be made, the file not be read.
         """
         path = memory_path(folder, valve)
-        try:
+        with explain_failure(path, "what is known cannot be kept there"):
             folder.mkdir(parents=True, exist_ok=True)
             return cls(path, conditions, read_memory(path, valve, conditions))
-        except OSError as error:
-            raise InputError(str(path), f"what is known cannot be kept there: {error.strerror}") from None
 
 
 class MemoryKeeper:
