@@ -191,6 +191,12 @@ def test_a_residual_that_hangs_on_the_state_is_structured(cause: str) -> None:
     assert structure(record, noise(3000) + NOISE_M * shapes[cause]) > STRUCTURED
 
 
+def test_what_never_changes_is_no_state_that_a_residual_could_hang_on() -> None:
+    recording = moving()
+    still = Recording({**recording.columns, "command_pa": np.full(3000, 4e4)})
+    assert structure(ready(still), noise(3000)) < STRUCTURED
+
+
 def test_a_missed_slip_is_not_structure_and_does_not_hide_it() -> None:
     record = ready(moving())
     slip_m = np.zeros(3000)

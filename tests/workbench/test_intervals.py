@@ -10,6 +10,7 @@ from sim.karnopp import Vector
 from tests.cases import few_always
 from tests.workbench.valves import SLIM, record_of
 from workbench.data.record import ready
+from workbench.fit.fit_result import terms
 from workbench.fit.likelihood import Groups, Likelihood, soft
 from workbench.fit.minimiser import End
 from workbench.fit.problem import problem
@@ -65,3 +66,29 @@ def test_the_truth_lies_inside_in_nineteen_of_twenty(like: Likelihood, scatter: 
         own = scatter * generator.standard_normal(moves + 1) * np.where(np.arange(moves + 1) % TELL, 1.0, 4.0)
         held += straight.held(own[move_of] + generator.standard_normal(like.count))
     assert held >= 0.85 * DRAWS, "by samples alone 63 of 100, where the valve scatters"
+
+
+def test_a_combination_names_who_takes_part_in_it_and_by_which_power() -> None:
+    """Jacobians that are blind to (0.85, 0.4, 0.33, 0.1): what takes part by a tenth is not worth a word."""
+    record = ready(record_of(SLIM, 7, command_pa=to_and_fro()))
+    names = ["spring_n_per_m", "coulomb_n", "viscous_ns_per_m", "mass_kg"]
+    like = problem(record, SLIM.valve).likelihood(Composition.from_file(SLIM), names)
+    open_ = np.array([0.85, 0.4, 0.33, 0.1])
+    open_ /= np.linalg.norm(open_)
+    seen = np.random.default_rng(1).standard_normal((like.count, 4)) @ (np.eye(4) - np.outer(open_, open_))
+    groups = like.at(like.composition.theta, like.run.first_onsets_s())
+    z = like.coordinates(like.composition.theta)
+    (found,) = uncertainty(like, End(z, np.empty(0), like.cost(groups.whole), groups, seen)).undetermined
+    assert found.names == tuple(each.name for each in like.parameters[:3])
+    assert found.powers == pytest.approx(open_[:3] / open_[0])
+
+
+def test_each_landing_break_away_and_parameter_that_moved_is_one_witness(like: Likelihood) -> None:
+    """Samples in motion hang together and count for fewer; a rest is one, however long."""
+    groups = like.at(like.composition.theta, like.run.first_onsets_s())
+    found = terms(like, groups, moved=np.array([0.3, -2.0, 1.0]))
+    assert found.landings.independent == groups.landings.size
+    assert found.break_aways.independent == groups.break_aways.size
+    assert found.moved.independent == 3
+    assert found.rests.independent == np.unique(like.layout.rest_of).size
+    assert 0.0 < found.motion.independent <= groups.motion.size
