@@ -1,5 +1,7 @@
 """The inputs that an experiment is chosen from: each stays inside its range, and does what its name says."""
 
+from itertools import pairwise
+
 import numpy as np
 import pytest
 
@@ -13,7 +15,7 @@ def stretches(levels: np.ndarray) -> list[tuple[int, int]]:
     """Return direction and length, in steps of the phase, of each stretch: +1 up, -1 down, 0 held."""
     way = np.sign(np.diff(levels).round(9)).astype(int)
     ends = [0, *(np.flatnonzero(np.diff(way)) + 1).tolist(), way.size]
-    return [(int(way[first]), end - first) for first, end in zip(ends[:-1], ends[1:], strict=True)]
+    return [(int(way[first]), end - first) for first, end in pairwise(ends)]
 
 
 @pytest.mark.parametrize("name", MENU)
