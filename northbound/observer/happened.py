@@ -18,7 +18,7 @@ from positioner.history import HistoryReader
 from positioner.history.entries import Event
 
 FROM_HISTORY = "from the daemon's history"
-AS_SERVED = "as seen since this page looks; the daemon's history is off, or not on this machine"
+AS_SERVED = "seen since this page was opened; the daemon keeps no history, or not on this machine"
 IN_CODES = frozenset(
     (
         EventKind.MODE,

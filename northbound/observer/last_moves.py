@@ -55,7 +55,7 @@ def last_moves(
     source = "the daemon's recording, at its full rate"
     if recording is None:
         recording = join_polls(view.trend(now_s - seconds))
-        source = "as polled: the daemon's recording is off, not on this machine, or not written any more"
+        source = "as polled by this page: there is no recording of the daemon here, or it is old"
     return None if recording is None else LastMoves(recording, source, respond(recording))
 
 

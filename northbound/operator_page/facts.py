@@ -65,7 +65,7 @@ def status(picture: ValvePicture) -> list[Fact]:
             BY_NAME["device_status"].text,
         ),
         Fact("CANopen's emergency", _emergency(picture.value("emergency")), BY_NAME["emergency"].text),
-        Fact("restored knowledge", picture.text("restored"), BY_NAME["restored"].text),
+        Fact("kept from before the restart", picture.text("restored"), BY_NAME["restored"].text),
         Fact("experiment", picture.text("experiment_state"), BY_NAME["experiment_state"].text),
     ]
 
@@ -93,9 +93,9 @@ def cycle(picture: ValvePicture) -> list[Fact]:
     counts = [
         ("cycles", "cycles"),
         ("missed periods", "missed_periods"),
-        ("samples not used", "lost_samples"),
+        ("samples that no cycle used", "lost_samples"),
         ("lost replies", "lost_replies"),
-        ("not recorded", "unrecorded"),
+        ("samples not recorded", "unrecorded"),
     ]
     return [
         *(Fact(label, milli.text(picture.value(name)), BY_NAME[name].text) for label, name in times),

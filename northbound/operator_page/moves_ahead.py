@@ -21,8 +21,8 @@ BY_LAW = {
     "conventional": "gradually, as a PI controller does",
 }
 """How a `[control] law` takes the stem to a reference; of another its name is said."""
-UNKNOWN_FILE = "the page was not given the daemon's file, which says it"
-NOBODY_KNOWS = "who wrote it is not known: the daemon keeps no history, or not where this page can read it"
+UNKNOWN_FILE = "not known without the daemon's file (start the page with --config)"
+NOBODY_KNOWS = "its writer is not known: the daemon keeps no history that this page can read"
 
 
 @dataclass(frozen=True, slots=True)
@@ -58,9 +58,9 @@ class Ahead:
         wrote = f"written by {self.writer.words}" if self.writer else NOBODY_KNOWS
         return [
             f"The stem stands at {self.stands}. The reference is {self.waits}: {wrote}.",
-            f"Going there moves the stem by {way:+.1%} of its stroke{self._length(way)}.",
+            f"To go there moves the stem by {way:+.1%} of its stroke{self._length(way)}.",
             f"How long: {self._how_long()}.",
-            "Staying writes the stem's own place as the reference. Whoever writes another then moves the valve.",
+            "To stay writes the stem's present position as the reference.",
         ]
 
     def manual(self, pressure_pa: float) -> list[str]:
@@ -69,9 +69,7 @@ class Ahead:
         lines = [f"The command goes from {shown(now_pa)} to {shown(pressure_pa)} at once, and stays there."]
         if math.isfinite(self._balance()[0]):
             there = self._rests(pressure_pa)
-            lines.append(
-                f"By what is identified the stem comes to about {self._position(there)}, give or take friction."
-            )
+            lines.append(f"The spring balances it at about {self._position(there)}; friction may stop the stem before.")
         else:
             lines.append("How far the stem goes is not known before the valve is identified.")
         return lines
@@ -80,37 +78,37 @@ class Ahead:
         """Say what an identification is going to do."""
         return [
             *self._excitation(),
-            "Then the law has the command again. Where the stem is by then it may stay until the next reference.",
+            "Then the law commands again. The stem may stay where it is until the next reference.",
         ]
 
     def _excitation(self) -> Iterator[str]:
         if self.settings is None:
-            yield f"Whether a sine or a staircase of slides moves the stem, how far and how long: {UNKNOWN_FILE}."
+            yield f"What moves the stem, a sine or a staircase, how far and how long: {UNKNOWN_FILE}."
             return
         table = self.settings.excitation
         if self.settings.by_slides:
             low, high = map(self._position, table.travel_window)
             yield f"From {self.stands} a staircase of pressures takes the stem up and down between {low} and {high}."
-            yield "How far each step takes it is not known before: the first are small, and grow until it slides."
-            yield f"How long: until slides of both directions agree, at most {table.staircase_limit_s:g} s."
+            yield "The first steps are small. They grow until the stem slides."
+            yield f"How long: until slides in both directions agree, at most {table.staircase_limit_s:g} s."
         else:
             yield from self._sine(table.limit_s)
         if table.permitted_travel is not None:
             low, high = map(self._position, table.permitted_travel)
-            yield f"Beyond {low} to {high} it is broken off."
+            yield f"It is broken off outside {low} to {high}."
 
     def _sine(self, limit_s: float) -> Iterator[str]:
         alpha_pa, beta_pa, omega = (self.picture.value(name) for name in ("alpha", "beta", "omega"))
         shown = self.units.pressure.text
-        about = shown(alpha_pa) if alpha_pa > 0 else "what keeps the stem where it is"
-        yield f"The pressure swings by ±{shown(beta_pa)} about {about}, {2 * math.pi / omega:.3g} s a period."
+        about = shown(alpha_pa) if alpha_pa > 0 else "the pressure that holds the stem"
+        yield f"The pressure swings by ±{shown(beta_pa)} about {about}, with a period of {2 * math.pi / omega:.3g} s."
         slope, _ = self._balance()
         if not math.isfinite(slope):
             yield "How far the stem goes is not known before the valve is identified."
         elif alpha_pa > 0:
             ends = sorted(self._rests(alpha_pa + sign * beta_pa) for sign in (-1, 1))
             low, high = map(self._position, ends)
-            yield f"The stem stands at {self.stands}, and goes into the range from {low} to {high}."
+            yield f"The stem stands at {self.stands}, and will move between {low} and {high}."
         else:
             most = beta_pa / slope / self.stroke_m
             yield f"The stem goes at most ±{most:.1%} of its stroke{self._length(most)} about {self.stands}."
@@ -130,7 +128,7 @@ class Ahead:
 
     def _how_long(self) -> str:
         law = "" if self.settings is None else self.settings.control.law
-        how = BY_LAW.get(law, f"as its law does, {law}") if law else UNKNOWN_FILE
+        how = BY_LAW.get(law, f"by law {law}") if law else UNKNOWN_FILE
         return f"{how}; {self._last_move()}"
 
     def _last_move(self) -> str:
@@ -139,7 +137,7 @@ class Ahead:
             if step.t86_s.value is not None and step.travel_m.value is not None:
                 went = abs(step.travel_m.value / self.stroke_m)
                 return f"the last move seen, of {went:.0%}, took {step.t86_s.value:.2g} s (T86)"
-        return "no move has been seen lately"
+        return "no move was seen lately"
 
     def _position(self, position_pu: float) -> str:
         return self.units.position_unit(self.stroke_m, turns=self.picture.turns).text(position_pu * self.stroke_m)

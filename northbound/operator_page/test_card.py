@@ -72,8 +72,8 @@ class TestCard:
         assert limits is not None
         low, high = limits.experiment.travel_window
         lines = (
-            f"The stem moves within {100 * low:g} to {100 * high:g} % of its stroke; the process must bear that.",
-            "You consent to it until its end: whoever breaks it off, or a veto, gives the law the valve back.",
+            f"The stem moves between {100 * low:g} and {100 * high:g} % of its stroke. The process must allow it.",
+            "You consent until the end of the test. If it is broken off or vetoed, the law commands again.",
         )
 
         async def begin() -> None:

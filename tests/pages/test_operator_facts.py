@@ -2,6 +2,7 @@
 
 import json
 import math
+import re
 import time
 from dataclasses import replace
 from pathlib import Path
@@ -23,7 +24,7 @@ from northbound.observer.trends import thin_columns
 from northbound.observer.valve_view import ValvePicture
 from northbound.observer.waiting_reference import Writer
 from northbound.operator_page import facts
-from northbound.operator_page.moves_ahead import BY_LAW, Ahead
+from northbound.operator_page.moves_ahead import BY_LAW, NOBODY_KNOWS, UNKNOWN_FILE, Ahead
 from webpage.units import LENGTHS, Units
 
 STROKE_M = 0.1
@@ -137,18 +138,22 @@ def ahead(*, law: str = "seed", file: bool = True, **values: float) -> Ahead:
     return Ahead(with_values(**(asked | values)), STROKE_M, Units(), settings, writer)
 
 
+def figures(line: str) -> list[str]:
+    """Return the numbers of a sentence, with their units."""
+    return re.findall(r"[+±]?\d[\d.]* ?(?:%|mm|bar|s\b)", line)
+
+
 def test_before_automatic_it_is_said_how_far_by_what_and_who_wrote_the_reference() -> None:
     stands, way, how, _ = ahead().automatic()
-    assert stands.startswith(
-        "The stem stands at 20.00 %. The reference is 70.00 %: written by 10.0.0.7:4001, 1970-01-01"
-    )
-    assert way == "Going there moves the stem by +50.0% of its stroke (50.00 mm)."
-    assert how == "How long: in one step of the pressure, as fast as the valve goes; no move has been seen lately."
+    assert figures(stands) == ["20.00 %", "70.00 %"]
+    assert "10.0.0.7:4001, 1970-01-01" in stands
+    assert figures(way) == ["+50.0%", "50.00 mm"]
+    assert BY_LAW["seed"] in how
     unknown = replace(ahead(file=False), writer=None)
-    assert "who wrote it is not known" in unknown.automatic()[0]
-    assert "the page was not given the daemon's file" in unknown.automatic()[2]
+    assert NOBODY_KNOWS in unknown.automatic()[0]
+    assert UNKNOWN_FILE in unknown.automatic()[2]
     (nothing,) = ahead(reference_opening=0.2).automatic()
-    assert nothing.startswith("The stem stands at 20.00 %. No other reference waits")
+    assert figures(nothing) == ["20.00 %"]
 
 
 def test_every_law_of_ours_says_how_it_moves() -> None:
@@ -156,27 +161,20 @@ def test_every_law_of_ours_says_how_it_moves() -> None:
 
 
 def test_before_an_identification_it_is_said_how_far_and_how_long() -> None:
-    swings, far, long, after = ahead().identification()
-    assert swings == "The pressure swings by ±0.132 bar about what keeps the stem where it is, 6.28 s a period."
-    assert far == "How far the stem goes is not known before the valve is identified."
-    assert long == "How long: until friction and spring are identified, at most 10 s."
-    assert after.startswith("Then the law has the command again.")
-    assert (
-        ahead(b_over_c_applied=-8e5, offset_applied=0.0).identification()[1]
-        == "The stem goes at most ±16.5% of its stroke (16.55 mm) about 20.00 %."
-    )
+    swings, far, long, _ = ahead().identification()
+    assert [figures(each) for each in (swings, far, long)] == [["±0.132 bar", "6.28 s"], [], ["10 s"]]
+    within = ahead(b_over_c_applied=-8e5, offset_applied=0.0).identification()[1]
+    assert figures(within) == ["±16.5%", "16.55 mm", "20.00 %"]
     about = ahead(b_over_c_applied=-8e5, offset_applied=0.0, alpha=44e3).identification()[1]
-    assert about == "The stem stands at 20.00 %, and goes into the range from 38.45 % to 71.55 %."
-    stairs = ahead(law="slides").identification()
-    assert stairs[0] == "From 20.00 % a staircase of pressures takes the stem up and down between 10.00 % and 90.00 %."
-    assert stairs[2] == "How long: until slides of both directions agree, at most 600 s."
+    assert figures(about) == ["20.00 %", "38.45 %", "71.55 %"]
+    window, _, limit, _ = ahead(law="slides").identification()
+    assert [figures(window), figures(limit)] == [["20.00 %", "10.00 %", "90.00 %"], ["600 s"]]
 
 
 def test_before_manual_it_is_said_where_the_pressure_takes_the_stem() -> None:
     commanded, far = ahead(b_over_c_applied=-8e5, offset_applied=0.0).manual(40e3)
-    assert commanded == "The command goes from 0.240 bar to 0.400 bar at once, and stays there."
-    assert far == "By what is identified the stem comes to about 50.00 %, give or take friction."
-    assert "not known" in ahead().manual(40e3)[1]
+    assert [figures(each) for each in (commanded, far)] == [["0.240 bar", "0.400 bar"], ["50.00 %"]]
+    assert not figures(ahead().manual(40e3)[1])
 
 
 def test_a_reference_that_waits_is_shown_and_one_that_is_followed_is_not() -> None:

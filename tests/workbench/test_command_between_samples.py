@@ -110,7 +110,6 @@ def test_a_few_movements_leave_it_open_and_that_is_said(acts_s: float) -> None:
     few = {name: column[:22] for name, column in recording.columns.items()}
     found = sampling(ready(Recording(few, recording.metadata)), CALM.valve)
     assert (found.held, found.sure) == (True, False)
-    assert "which the recording does not tell" in found.sentence
 
 
 def test_one_swing_again_and_again_says_nothing() -> None:

@@ -86,9 +86,7 @@ def test_what_the_recording_wants_beyond_its_physical_range_is_refused_however_w
     (candidate,) = step.candidates
     assert not candidate.physical
     assert step.added is None
-    assert candidate.rejection_reason.startswith(
-        "not physical: the recording wants quadratic_drag.drag_ns2_per_m2 beyond 0, the end of its range from 0 to "
-    )
+    assert "quadratic_drag.drag_ns2_per_m2" in candidate.rejection_reason
 
 
 def test_a_bound_that_is_far_from_the_end_of_the_declared_range_does_not_refuse() -> None:
@@ -150,7 +148,9 @@ def test_what_narrowly_falls_short_of_the_rule_stands_beside_what_narrowly_passe
         friction_drift=POOR,
     )
     assert {each.name for each in step.candidates if each.accepted} == {"sensor_lag"}
-    assert reasons(step)["dead_time"] == "what was held out does not show it: evidence 5.9 there, more than 6 needed"
+    (short,) = [each.gain for each in step.candidates if each.name == "dead_time"]
+    assert short is not None
+    assert short.held_out_evidence == pytest.approx(5.9)
     assert set(names(step)) == {"dead_time", "sensor_lag"}
 
 

@@ -74,7 +74,7 @@ def test_without_an_effect_the_valve_is_refitted_as_it_is(tmp_path: Path, capsys
     assert main(words) == 0
     assert "refitted, nothing added: the held-out error falls from" in capsys.readouterr().out
     (step,) = Journal.beside(tmp_path / "own.toml").steps
-    assert (step.effects, step.why) == ((), "the parameters were off")
+    assert step.effects == ()
     assert step.extended_test_rmse_m < 0.1 * step.given_test_rmse_m
     report_journal(Journal.beside(tmp_path / "own.toml"), tmp_path / "own.html", "own", BARE.valve.own)
     assert "Step 1: refitted, nothing added" in (tmp_path / "own.html").read_text(encoding="utf-8")

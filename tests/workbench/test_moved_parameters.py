@@ -28,7 +28,7 @@ def test_a_preload_that_the_recording_excludes_is_said_with_what_may_look_the_sa
     assert found.name == "preload.force_n"
     assert {"asymmetric_friction", "sensor_offset"} <= {*found.like}
     said = found.sentence(KINDS["valve"])
-    assert "by the recording preload.force_n is 939.5 (95 %: 938 to 941), not 900 as in the valve file; " in said
+    assert all(each in said for each in ("preload.force_n", "939.5", "938 to 941", "900"))
     assert "asymmetric_friction" in said
 
 

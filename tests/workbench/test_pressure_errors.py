@@ -125,7 +125,6 @@ def test_what_the_i_p_hides_from_the_stem_is_no_friction() -> None:
     assert found.by_pressure is not None
     after_n = {name: after for name, _, after in found.by_pressure.others}["coulomb_n"]
     assert after_n == pytest.approx(truly_n, rel=0.05), "of a transmitter that shows 2 % too much, and noise"
-    assert "But the measured pressure is not the model's" in found.sentence
     assert "coulomb_n" in found.sentence
     assert not found.nothing_off
 
@@ -136,7 +135,7 @@ def test_a_pressure_that_the_stem_follows_less_well_is_doubted(worse: bool) -> N
     others = (("coulomb_n", 90.0, 95.0),)
     said = ByMeasuredPressure(200.0, 0.07, model, others, 4e-6, worse).sentence(model.fit.kind)
     assert "coulomb_n 95, not 90" in said
-    assert ("; by the command it is 0.004 mm: noise of a transmitter" in said) == worse
+    assert ("0.004 mm" in said) == worse
 
 
 @pytest.mark.long

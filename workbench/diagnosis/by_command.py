@@ -30,9 +30,9 @@ class ByCommand(Brief):
         length, word = kind.length, kind.command.word
         other_m, here_m = length.number(self.model.errors.test_rmse_m), length.said(self.by_pressure_rmse_m)
         return kind.text(
-            f"by the command the same valve leaves {other_m} held out in place of {here_m}: of what drives the stem "
-            f"the measured {word} is the worse witness, as that of a transmitter which is noisy, lags, stands still or "
-            "is cut off, or of another line; diagnose by the command"
+            f"driven by the command, the same valve leaves a held-out error of {other_m} in place of {here_m}. "
+            f"The measured {word} is not what drives the stem: its transmitter is noisy, slow or stuck, or sits on "
+            "another line. Diagnose by the command"
         )
 
 

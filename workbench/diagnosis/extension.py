@@ -79,14 +79,14 @@ class Extension(Result):
         before_m = self.refitted_errors.test_rmse_m if self.effects else self.given_test_rmse_m
         after_m = self.extended_errors.test_rmse_m
         length = self.extended.kind.length
-        falls = "falls from" if self.falls else "does not fall by more than chance may: from"
+        falls = "falls from" if self.falls else "does not fall by more than chance: from"
         rows = [
             (what, length.number(train_m, ".4g"), length.number(test_m, ".4g"))
             for what, (train_m, test_m) in self.stages.items()
         ]
         floor = "unknown" if self.split.floor_m is None else length.number(self.split.floor_m, ".4g")
         by_command = self.extended.from_pressure and self.split.by_pressure is None
-        rows.append(("floor: what no model undercuts" + BY_COMMAND * by_command, floor, floor))
+        rows.append(("floor: least error of any model" + BY_COMMAND * by_command, floor, floor))
         scale = pressure_scale(self.split.train.record) if self.extended.from_pressure else None
         return [
             f"{self.named}{'' if self.effects else ':'} the held-out error {falls} {length.number(before_m, '.4g')} to "

@@ -51,7 +51,7 @@ class ExtensionStep(Schema):
         )
         return cls(
             effects=extension.effects,
-            why=said if extension.effects else "the parameters were off",
+            why=said if extension.effects else "the parameters were wrong",
             given_train_rmse_m=extension.given_train_rmse_m,
             given_test_rmse_m=extension.given_test_rmse_m,
             refitted_train_rmse_m=before.train_rmse_m,

@@ -19,8 +19,8 @@ from workbench.model.sampling import MORE_LANDINGS, Sampling, landings
 A_PARAMETER_FITTED, A_PARAMETER_HELD_OUT = 2, 1
 """Landings that each parameter takes; more are needed."""
 UNTOLD = (
-    "whether, or when, the command changed between samples the recording does not tell, and what is left may be what "
-    "it did there"
+    "the recording does not show whether, or when, the command changed between samples, and the error that is left may "
+    "come from that"
 )
 
 
@@ -42,7 +42,7 @@ class JudgedLandings:
     def sentence(self) -> str:
         """Say why nothing is judged by them."""
         if self.enough:
-            return "what is left where the stem lands may be what the pressure did between samples, which is not known"
+            return "the error that landings leave may come from the pressure between samples, which is not known"
         return (
             f"{self.fitted} landings fitted and {self.held_out} held out are too few for {self.parameters} parameters, "
             f"more than {A_PARAMETER_FITTED * self.parameters} and {A_PARAMETER_HELD_OUT * self.parameters} are needed"

@@ -42,9 +42,10 @@ class KeptMass(Brief):
     def sentence(self) -> str:
         """What to do about it, in one sentence."""
         return (
-            f"the mass is kept at {self.kept_kg:.3g} kg; were it {self.fitted_kg:.3g}, the held-out error would be "
-            f"{self.length.number(self.fitted_rmse_m)} in place of {self.length.said(self.kept_rmse_m)}: weigh "
-            "plate, stem and plug, or put this mass_kg into the valve file, and diagnose again"
+            f"the mass in the valve file, {self.kept_kg:.3g} kg, is not fitted; with {self.fitted_kg:.3g} kg the "
+            f"held-out error would be {self.length.number(self.fitted_rmse_m)} in place of "
+            f"{self.length.said(self.kept_rmse_m)}. Weigh plate, stem and plug, or put this mass_kg into the file, and "
+            "diagnose again"
         )
 
 

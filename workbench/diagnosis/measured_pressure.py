@@ -47,8 +47,8 @@ class ByMeasuredPressure(Brief):
         others = "".join(f", {name} {after:.4g}, not {before:.4g}" for name, before, after in self.others)
         error = kind.length.said(self.model.errors.test_rmse_m)
         return kind.text(
-            f"the measured {word} is not the model's: they differ by {read.said(self.off_pa)} rms, "
-            f"{self.of_friction:.0%} of the friction; from the measured one on the held-out error is {error}{others}"
+            f"the measured {word} differs from the model's by {read.said(self.off_pa)} rms, {self.of_friction:.0%} of "
+            f"the friction; driven by the measured one, the valve leaves a held-out error of {error}{others}"
             f"{self._doubt(kind)}"
         )
 
@@ -56,8 +56,8 @@ class ByMeasuredPressure(Brief):
         if not self.worse:
             return ""
         return (
-            f"; by the command it is {kind.length.said(self.commanded_rmse_m)}: noise of a transmitter that hangs "
-            "together from sample to sample differs so, and moves no stem; then nothing of this is the stem's"
+            f"; driven by the command, {kind.length.said(self.commanded_rmse_m)}. Slow noise of the transmitter would "
+            "look so, and moves no stem"
         )
 
 

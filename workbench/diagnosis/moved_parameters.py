@@ -33,8 +33,8 @@ class Moved:
         after = self.fitted
         same = f"; {' or '.join(self.like)} may look the same" if self.like else ""
         return kind.text(
-            f"by the recording {self.name} is {after.value:.4g} (95 %: {after.lower:.4g} to {after.upper:.4g}), "
-            f"not {self.before:.4g} as in the valve file{same}"
+            f"the recording says that {self.name} is {after.value:.4g} (95 %: {after.lower:.4g} to {after.upper:.4g}); "
+            f"the valve file says {self.before:.4g}{same}"
         )
 
 

@@ -42,7 +42,7 @@ HALF = 0.5
 """Of what is needed: so much of the other must be excluded, where that is not needed."""
 WORTH = 4.0
 """Times what is left, that friction found from a measured pressure must be worth."""
-ROUGH = "But the valve with both does not explain the recording: how much of either there is, these figures do not tell"
+ROUGH = "But the valve with both does not explain the recording: these figures are rough"
 NOTHING = Gain(0.0, 0.0, 0.0)
 NO_FRICTION = 1e-3
 """Of the fitted one: what a stem without friction has left, by which it comes to rest."""
@@ -81,23 +81,23 @@ class PositionerOrPacking(Brief):
         """Say it, but for the errors."""
         friction = f"friction that is worth {1e3 * self.play_m:.3g} mm of the spring ({self.friction_n:.3g} N)"
         band = f"a dead band of {1e3 * self.dead_band_m:.3g} mm"
-        besides = "holds the stem besides is not told"
+        besides = "holds the stem, too, is not known"
         neither = (
-            "either does without the other"
+            "either alone explains it"
             if self.at_floor
             else "neither is needed, and with both the valve does not explain it"
         )
         if self.cause == "not told" and not self.found_twice:
-            return "Whether positioner or packing holds the stem is not told: no second search came as low"
+            return "Whether positioner or packing holds the stem is not known: no second search found as small an error"
         said: dict[Cause, str] = {
             "packing": f"It is the packing, not the positioner: {friction}; no dead band is needed",
             "positioner": f"It is the positioner, not the packing: {band}; no friction is needed",
             "both": f"It is both, packing and positioner: {friction}, and {band}",
             "at least packing": f"It is the packing: {friction}; whether a dead band {besides}",
             "at least positioner": f"It is the positioner: {band}; whether friction {besides}",
-            "not told": "This recording does not tell the positioner's dead band from the packing's friction, "
-            f"{neither}; measured actuator pressure would: a dead band leaves it still, friction lets it rise until "
-            "the stem jumps",
+            "not told": f"The recording cannot tell the positioner's dead band from the packing's friction: {neither}. "
+            "Measure the actuator pressure: with a dead band it stays constant, with friction it rises until the stem "
+            "jumps",
         }
         return said[self.cause]
 

@@ -43,10 +43,10 @@ class PressureScale(Brief):
         way = f"{self.span:.3g} times as large as" if off_span else "off"
         read = next((f", as {one} read as {other} are" for one, other in _units(self.span)), "") if off_span else ""
         by = "" if off_span else f" by {kind.command.read.said(self.above_pa)}"
-        zero = "" if off_span or abs(self.above_pa / ATMOSPHERE_PA - 1.0) > ALIKE_RATIO else ", as absolute ones are"
+        zero = "" if off_span or abs(self.above_pa / ATMOSPHERE_PA - 1.0) > ALIKE_RATIO else ", like an absolute one"
         return kind.text(
-            f"the measured {kind.command.word} is {way} the command{by}{read or zero}: what is fitted by it are other "
-            "forces; mend its unit, zero or line, or diagnose by the command"
+            f"the measured {kind.command.word} is {way} the command{by}{read or zero}, so forces fitted by it are "
+            "wrong; correct its unit, zero or line, or diagnose by the command"
         )
 
 

@@ -46,11 +46,11 @@ class StandIn(Brief):
     @property
     def sentence(self) -> str:
         """Say so, in one sentence."""
-        stand = "stands" if len(self.named) == 1 else "stand"
+        imitate = "imitates" if len(self.named) == 1 else "imitate"
         return (
             f"A form without a name does better: {self.words}, alone, leaves {self.length.number(self.form_rmse_m)} "
-            f"held out in place of {self.length.said(self.named_rmse_m)}; {' and '.join(self.named)} only {stand} in "
-            "for it, and `positioner discover` writes it"
+            f"held out in place of {self.length.said(self.named_rmse_m)}. So {' and '.join(self.named)} only {imitate} "
+            "it; `positioner discover` writes it"
         )
 
 

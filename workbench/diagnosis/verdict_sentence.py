@@ -21,8 +21,8 @@ NONE_ABOVE = 1.01
 """Static over sliding friction."""
 SCATTERS = 3.0
 """Times the noise: a valve that repeats itself no better scatters."""
-OF_COMMAND = "the floor is how well the valve repeats itself by its command: by the measured pressure less may be left"
-REPEAT = " If the valve itself scatters so much, a repeated segment of the command shows it."
+OF_COMMAND = "the floor is the repeatability under the command; driven by the measured pressure, less may be left"
+REPEAT = " To see whether the valve itself scatters so much, let the command repeat a stretch."
 
 
 def verdict_line(verdict: Verdict, sentence: str) -> str:
@@ -96,14 +96,17 @@ def floor_by_pressure(parts: Split, kind: Kind) -> list[str]:
     scatter, word = parts.by_pressure, kind.command.word
     said = [kind.text(OF_COMMAND)] if parts.repeats else []
     if scatter is None:
-        return [*said, kind.text(f"the floor has nothing of the measured {word}'s noise, which does not show at rest")]
+        return [
+            *said,
+            kind.text(f"the noise of the measured {word} does not show at rest, and is not part of the floor"),
+        ]
     moved = kind.length.said(scatter.typical_m, ".2g")
     noise = kind.command.read.said(scatter.noise_pa, ".2g")
     return [
         *said,
         kind.text(
-            f"the noise of the measured {word}, {noise}, moves the stem by {moved} in a typical second: the floor "
-            "has that"
+            f"the noise of the measured {word}, {noise}, moves the stem by {moved} in a typical second; this is part "
+            "of the floor"
         ),
     ]
 
@@ -117,7 +120,7 @@ def _no_break_away(found: Fit) -> str:
     if not found.by.slow or static is None or not static.at_bound or static.value > NONE_ABOVE * coulomb_n:
         return ""
     return (
-        f" Between samples so far apart no break-away is seen: {BASE[STATIC]} came out at {BASE[COULOMB]}, the least "
+        f" The samples are too far apart to show a break-away: {BASE[STATIC]} came out at {BASE[COULOMB]}, the least "
         "it can be, and may be more."
     )
 
@@ -128,7 +131,7 @@ def _kept_off(equivalent: EffectCandidate | None, best: EvaluatedModel) -> str:
         return ""
     fell = reduction_sentence(best.errors, equivalent.model.errors, best.fit.kind.length)
     return (
-        f"a parameter that was kept is off: with {equivalent.name}, the bare valve by another name, {fell}. "
+        f"a parameter that is not fitted is wrong: with {equivalent.name}, which acts like another mass, {fell}. "
         "Put the mass_kg that plate, stem and plug weigh into the valve file, and diagnose again."
     )
 
@@ -137,11 +140,11 @@ def _adequate(errors: BlockErrors, parts: Split, length: Scale, given: AsGiven) 
     """Say that the valve explains the record, whether it had to be refitted for that, and what it leaves of it."""
     after, floors = length.said(errors.test_rmse_m), _floors_left(errors, parts)
     much = floors > NOISE_KNOWN_TO
-    left = f" What is left is {floors:.2g} times the floor: no effect here explains it." if much else ""
+    left = f" {floors:.2g} times the floor is left, which no effect here explains." if much else ""
     if given.is_off(errors):
         fell = f"from {length.number(given.errors.test_rmse_m)} to {after}"
-        return f"No effect is missing: the parameters were off. Refitted, the held-out error falls {fell}.{left}"
-    return f"Nothing is missing: no effect lowers the held-out error, {after}, by more than chance may.{left}"
+        return f"No effect is missing: the parameters were wrong. Refitted, the held-out error falls {fell}.{left}"
+    return f"Nothing is missing: no effect lowers the held-out error, {after}, by more than chance.{left}"
 
 
 def _floors_left(errors: BlockErrors, parts: Split) -> float:
@@ -154,8 +157,8 @@ def _left(errors: BlockErrors, parts: Split, suspected: Sequence[EffectCandidate
     if floors <= NOISE_KNOWN_TO:
         return "nothing is left to explain"
     if suspected:
-        return f"{floors:.2g} times the floor are left, which no other effect is proved to explain"
-    return f"{floors:.2g} times the floor are left, which no other effect here explains"
+        return f"{floors:.2g} times the floor is left, which no other effect is proved to explain"
+    return f"{floors:.2g} times the floor is left, which no other effect here explains"
 
 
 def _unproved(
@@ -165,7 +168,7 @@ def _unproved(
     if verdict == "unjudged":
         return f"Not judged: {_not_known(best, parts)}"
     if verdict == "untrusted":
-        return "Not to be trusted: searches from independent starts do not come to the same."
+        return "Not to be trusted: searches from independent starts end at different parameters."
     tried = sum(each.model is not None for each in steps[-1].candidates)
     missing = sum(name not in steps[-1].before.effects for name in library)
     return f"Broken off in step {len(steps)}, with {tried} of {missing} effects refitted; nothing is judged."
@@ -222,7 +225,7 @@ def _suspicion(suspected: Sequence[EffectCandidate]) -> str:
     best = max(suspected, key=lambda each: each.evidence)
     return (
         f" Suspected, not proved: {' or '.join(each.name for each in suspected)}; of {best.name}, "
-        f"{best.rejection_reason}. A longer recording would tell."
+        f"{best.rejection_reason}. A longer recording would show it."
     )
 
 
@@ -236,7 +239,6 @@ def _scatter(parts: Split, length: Scale) -> str:
     if noise_m is None or parts.floor_m is None or parts.by_pressure or parts.floor_m < SCATTERS * noise_m:
         return ""
     return (
-        f" The valve itself scatters: a repeated command repeats the position to {length.said(parts.floor_m)}, where "
-        f"the sensor's noise is {length.said(noise_m, '.2g')}. What makes the difference follows neither command nor "
-        "position."
+        f" The valve itself scatters: under a repeated command its position differs by {length.said(parts.floor_m)}, "
+        f"and the sensor's noise is {length.said(noise_m, '.2g')} only."
     )

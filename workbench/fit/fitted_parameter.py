@@ -29,7 +29,7 @@ class Fitted:
     def remark(self) -> str:
         """What is wrong with it; empty if nothing is."""
         if not self.physical:
-            return "not physical: the recording wants it beyond its range"
+            return "not physical: the fit takes it beyond its range"
         if not (isfinite(self.lower) and isfinite(self.upper)):
             return "not determined by this recording"
         return "at the end of its range" if self.at_bound else ""

@@ -16,8 +16,8 @@ from workbench.model.told_run import ToldMove, told_moves
 LEAST_MOVES = 2
 """Moves of the stem, one each way: two slow ramps tell the balance of forces all along; two steps leave it wide."""
 NO_REST = (
-    "the stem creeps or moves throughout, and is not seen to rest between moves: what holds it is not told from what "
-    "drives it; record steps that are held until it rests"
+    "the stem creeps or moves throughout, and does not rest between moves, so that friction does not show; record "
+    "steps that are held until it rests"
 )
 FREE = {Motion.DYNAMIC: DEFAULT, Motion.QUASI_STATIC: AT_REST, Motion.LANDINGS: LANDED}
 """What of the bare valve is fitted by default."""

@@ -184,13 +184,13 @@ def _verdict(
     if floor_n is not None and best.median_error_n > BALANCE_FLOORS * floor_n:
         part = f" A part of it is {names}: {fell}.{rivals}" if names else f" The held-out error is {after_n:.3g} N."
         return "unexplained", (
-            f"Something is left that the balance does not explain: it is off by {best.median_error_n:.3g} N, where "
-            f"strokes repeat each other to {floor_n:.3g} N.{part}"
+            f"Something is left that the balance does not explain: it is off by {best.median_error_n:.3g} N, and "
+            f"repeated strokes differ by {floor_n:.3g} N only.{part}"
         )
     if not names:
         return (
             "adequate",
-            f"Nothing is missing: no effect lowers the held-out error, {after_n:.3g} N, by more than chance may.",
+            f"Nothing is missing: no effect lowers the held-out error, {after_n:.3g} N, by more than chance.",
         )
     open_end = "" if floor_n is not None else " What is left is not judged: the curve passes each place once."
     if rivals:

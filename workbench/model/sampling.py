@@ -130,7 +130,7 @@ def sampling(record: Record, valve: ValveParameters) -> Sampling:
         return with_inertia(record, valve)
     sentence, sure = f"simulated without inertia, a step a sample: {why}", part is None or part.held
     if not sure:
-        sentence += "; the command is taken for held from each sample to the next, which the recording does not tell"
+        sentence += "; the command is taken as held from sample to sample, which the recording does not show"
     return Sampling(Motion.QUASI_STATIC, sentence, True, period_s, valve, sure)
 
 

@@ -12,11 +12,11 @@ from workbench.report.diagnosis_report import DIAGNOSIS_WORDS
 WORDS = {name.lower(): text for name, text in (COMPARISON | DIAGNOSIS_WORDS).items()} | {
     "held out": DIAGNOSIS_WORDS["Fitted, held out"],
     "fitted": DIAGNOSIS_WORDS["Fitted, held out"],
-    "slips": f"{COMPARISON['Slip']} Matched: the model slips as the stem does, about then. Missed: the "
-    "stem slips and the model does not. Spurious: the model slips and the stem does not.",
-    "preview": "A guess before any effect was fitted: how much of the error a weak effect of each kind would explain. "
-    "It is right in about two of three cases, and is no verdict.",
-    "step": "Effects are sought one after another: each step tries every effect beside those found before.",
+    "slips": f"{COMPARISON['Slip']} Matched: model and stem slip at about the same time. Missed: only the "
+    "stem slips. Spurious: only the model slips.",
+    "preview": "How much of the error a weak effect of each kind would explain, before any was fitted. It names the "
+    "right effect in some two of three cases, and is no verdict.",
+    "step": "Each step tries every effect beside those found before.",
 }
 SHOWS = 'class="text-body2 q-pa-sm" style="max-width: 320px; white-space: normal"'
 EFFECT_CELL = f"""<q-td :props="props"><span class="jump" tabindex="0">{{{{ props.row.effect }}}}

@@ -36,7 +36,7 @@ class JournalPanel:
                 ui.label(desk.plain(f"{number}. {step.extension.summary().splitlines()[0]}")).props(
                     'data-testid="journal-step"'
                 )
-            back = ui.button("Take the last step back", icon="undo", on_click=self._back)
+            back = ui.button("Undo the last step", icon="undo", on_click=self._back)
             back.props('outline no-caps data-testid="back"')
         heading("Save and export")
         with ui.row():
@@ -46,7 +46,7 @@ class JournalPanel:
                 'outline no-caps data-testid="notebook"'
             )
             if desk.sealed is not None:
-                ui.button("Reveal what was hidden", icon="visibility", on_click=self._reveal).props("outline no-caps")
+                ui.button("Reveal the hidden effect", icon="visibility", on_click=self._reveal).props("outline no-caps")
         self._answer = ui.column()
         ui.label("the same on a command line:").classes("quiet")
         self._commands = ui.column().classes("w-full").props('data-testid="commands"')

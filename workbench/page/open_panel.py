@@ -60,7 +60,7 @@ class OpenPanel:
             ui.label(f"{desk.opened.name}: {recording.summary().splitlines()[0]}").props('data-testid="opened"')
             stroke_m = desk.valve.file.valve.stroke_m if desk.valve else None
             said = wrong_with(desk.opened, stroke_m)
-            sentences(said or ("nothing in it had to be left out or cut",), "wrong")
+            sentences(said or ("no samples were left out",), "wrong")
             if desk.live is not None:
                 self._offer_second()
             if desk.valve is None:
@@ -93,7 +93,7 @@ class OpenPanel:
     def _offer_second(self) -> None:
         """Offer to take a second recording for what no fit sees."""
         held = self._desk.held_out
-        said = f"held out: {held.name}" if held else "held out: the last third of it"
+        said = f"held out: {held.name}" if held else "held out: its last third"
         with ui.expansion(said, icon="content_cut").classes("w-full").props('data-testid="held-out"'):
             drop_box("drop another recording of the same valve", "drop-held-out", self._handle_second_drop)
             if held:

@@ -47,7 +47,7 @@ class SearchPanel:
             )
             self._seek = ui.button("Discover a form", icon="functions", on_click=self._discover)
             self._seek.props('outline no-caps data-testid="discover"').tooltip(
-                "where no effect of the library explains it: looks for the form of what is missing; minutes"
+                "if no effect of the library explains it: looks for the form of what is missing; takes minutes"
             )
             self._cancel = ui.button("Cancel", icon="close", on_click=self._stop).props(
                 "outline no-caps color=negative"
@@ -55,7 +55,7 @@ class SearchPanel:
             shown_s = None if desk.budget_s == inf else desk.budget_s
             self._budget = NumberField("at most, s", shown_s, name="at most, s")
             self._budget.props('dense clearable data-testid="budget"').style("width: 110px")
-            self._budget.on("blur", self._handle_text).tooltip("after so long it says what is known then")
+            self._budget.on("blur", self._handle_text).tooltip("time limit; then the results so far are shown")
             names = ui.select(self._list_effects(), label="effects tried (all)", multiple=True, clearable=True)
             self._names = names.props('use-chips dense data-testid="effects"').style("min-width: 260px")
         with ui.column().classes("w-full") as self._progress:
@@ -181,7 +181,7 @@ class SearchPanel:
             self._race.clear()
             with self._race:
                 height_px = FRAME_PX + ROW_PX * len(search.race)
-                self._view = FigureView(self._theme, self._draw, height_px, "race of the candidates")
+                self._view = FigureView(self._theme, self._draw, height_px, "errors of the candidates")
         else:
             self._view.redraw()
 
@@ -222,18 +222,18 @@ class SearchPanel:
             with ui.row():
                 for effects in diagnosis.choices if may_add else ():
                     named = plain(", ".join(effects))
-                    button = ui.button(f"Add {named}" if named else "Take the fitted parameters", icon="add")
+                    button = ui.button(f"Add {named}" if named else "Use the fitted parameters", icon="add")
                     button.on_click(lambda effects=effects: self._add(search, effects))
                     button.props('no-caps data-testid="add"')
             if diagnosis.experiment is not None:
-                ui.label(f"An experiment would tell them apart: {diagnosis.experiment.name}.")
+                ui.label(f"An experiment that tells them apart: {diagnosis.experiment.name}.")
             for number, step in enumerate(diagnosis.steps, start=1):
                 before = self._desk.errors.shown(step.before.errors.test_rmse_m).text
                 with ui.row().classes("items-baseline").style("gap: 6px"):
                     word(f"step {number}", "step")
-                    ui.label(f"before it {before} {self._desk.errors.unit} rms").classes("quiet")
+                    ui.label(f"error before: {before} {self._desk.errors.unit} rms").classes("quiet")
                     word("held out")
-                    ui.label("; what decides is the").classes("quiet")
+                    ui.label("; judged by").classes("quiet")
                     word("evidence")
                 self._candidates(diagnosis, number, may_add=may_add)
 
@@ -266,7 +266,7 @@ class SearchPanel:
             "fitted": f"fitted, {of.unit}",
             "test": f"held out, {of.unit}",
             "bic": "evidence",
-            "outcome": "in the search",
+            "outcome": "outcome",
         }
         columns = [{"name": key, "label": head, "field": key, "align": "left"} for key, head in heads.items()]
         rows = [
@@ -286,7 +286,7 @@ class SearchPanel:
         table.add_slot("body-cell-effect", ADDING_CELL if may_add else EFFECT_CELL)
         if may_add:
             table.on("add", lambda event: self._extend(event.args["effects"]))
-            ui.label("press an effect to add it in any case").classes("quiet")
+            ui.label("press an effect to add it, whatever its outcome").classes("quiet")
 
     async def _add(self, search: Search, effects: Sequence[str]) -> None:
         """Add what was found: what is sure is not fitted again, one of several is."""

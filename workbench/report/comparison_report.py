@@ -40,12 +40,11 @@ MEANINGS = {
     "near stops": "within 2 % of the stroke of a stop",
 }
 WORDS = {
-    "Free run": "The model is given the command and where the stem stood at the start, and nothing else: "
-    "what it shows after that is its own.",
+    "Free run": "The model is given the command and the stem's first position, and nothing else.",
     "Error": "Simulated less measured position. Positive: the model stands too far open.",
     "rms": "Root of the mean square: the usual size of the error, in which large errors weigh more.",
-    "Floor": "The error that no model can undercut: the noise of the position sensor or, where the command repeats "
-    "itself in the recording, how well the valve repeats itself, whichever is more.",
+    "Floor": "The least error that any model can have: the noise of the position sensor. Where the command repeats "
+    "itself, it is the valve's repeatability, if that is more.",
     "Fit": "100 % less the error's size in per cent of the measured motion's. 100 % is perfect; "
     "below 0 % a straight line would do better.",
     "Slip": "A stuck stem that breaks away and moves until it is stuck again.",
@@ -309,8 +308,8 @@ def _statistics(each: Comparison) -> Html:
         "statistics",
         "For specialists: correlations and spectrum of the error",
         text(
-            "An error that hangs together with the command says that the model answers the command wrongly; inside the "
-            "grey band (99 %) nothing is proved. An error that hangs together with itself only need not be the model's."
+            "An error that correlates with the command shows that the model answers the command wrongly. Inside the "
+            "grey band (99 %) nothing is proved. An error that correlates with itself alone may be the sensor's."
         ),
         pair(
             plot(
@@ -318,7 +317,7 @@ def _statistics(each: Comparison) -> Html:
                 correlation(each.input_correlation, "correlation"),
                 280,
                 f"Error with the command: {each.input_correlation.outside} of {each.input_correlation.lag.size} shifts "
-                "outside the band. To the right of 0 the command comes first.",
+                "outside the band. Right of 0 the command comes first.",
             ),
             plot(
                 "plot-autocorrelation",
@@ -343,8 +342,8 @@ def _pressure(each: Comparison) -> list[str]:
     side, read = each.pressure_side, Reading(each.own)
     if side is None:
         return [
-            "The recording has no measured actuator pressure: whether an error arises before the actuator (converter, "
-            "tubing) or at the stem can only be told from its shape"
+            "The recording has no measured actuator pressure. Only the shape of an error shows whether it arises "
+            "before the actuator (converter, tubing) or at the stem"
         ]
     return [
         f"The {read.title('actuator pressure')} is measured; the model's is off by "
@@ -357,5 +356,5 @@ def _pressure(each: Comparison) -> list[str]:
 def recording(subject: Subject, notes: tuple[str, ...], more: list[str]) -> Html:
     """Return what is known of the recording itself."""
     said = [f"{key}: {value}" for key, value in subject.metadata.items()]
-    whole = [] if notes else ["Nothing in it had to be left out or cut"]
+    whole = [] if notes else ["No samples were left out"]
     return section("recording", "About the recording", bullets([*shorten_notes(notes), *whole, *more, *said]))

@@ -46,13 +46,16 @@ from workbench.select.experiment import Experiment
 
 DIAGNOSIS_WORDS = {
     "Effect": "One piece of physics on the way from the command to the indicated position: a lag, a kind of friction, "
-    "play in the linkage, a sensor's fault.",
+    "backlash in the linkage, a sensor's fault.",
     "Fitted, held out": "The model's parameters are fitted to one part of the data. The other part is held out: "
-    "the model has not seen it, so that an error which falls there is no trick of the fit.",
+    "the model has not seen it, so an error that falls there shows more than a good fit.",
     "Evidence": "How much better an effect explains the fitted part than the model without it, less a price for "
     f"each parameter it brings (gain of the Bayesian information criterion). Above {LEAST_BIC:g} it counts. Held out, "
     f"where nothing was fitted, no price is taken: above {LEAST_HELD_OUT:g} it counts.",
-    "95 % interval": "Where the parameter lies, as far as this recording says.",
+    "95 % interval": "The parameter lies in it with a probability of 95 %.",
+    "Rival": "An effect that explains the recording as well as the one that was added.",
+    "Told simulation": "The simulation is told when the stem moves, as the recording shows it. It says where the stem "
+    "goes.",
 }
 
 
@@ -181,13 +184,13 @@ def _fall(diagnosis: Diagnosis, validation: _Validation) -> Html:
             "plot-fall",
             figure,
             300,
-            f"Error, rms, of each model, on a logarithmic scale. The held-out data it had not seen before. Dashed: the "
+            f"Error, rms, of each model, on a logarithmic scale. No model was fitted to the held-out data. Dashed: the "
             f"floor, {read.said(validation.floor_m)}.",
         ),
         table("table-fall", head, rows),
         text(
-            "All errors are of a simulation that is told when the stem moves. The median move is a typical one, with "
-            "the rest that it ends in: one that went wrong weighs nothing in it, and much in the rms."
+            "All errors are those of the told simulation. A move is taken with the rest that it ends in. One bad move "
+            "does not change the median, and raises the rms."
         ),
     )
 
@@ -303,9 +306,9 @@ def _next(diagnosis: Diagnosis, commands: Sequence[str]) -> Html:
         "next",
         "What to do next",
         text(
-            f"Play this command to the valve: {chosen.name}. It was chosen from a menu by what it tells apart after "
-            f"every rival has been refitted: the wrong one is then left with an error of {chosen.separation:.3g} times "
-            "the sensor's noise. It stays within the pressures of the recording and begins at rest.",
+            f"Play this command to the valve: {chosen.name}. Of a menu of commands it tells the rivals apart best: "
+            f"refitted to the answer, the wrong one is left with an error of {chosen.separation:.3g} times the "
+            "sensor's noise. It stays within the pressures of the recording and begins at rest.",
         ),
         plot(
             "plot-experiment",
@@ -324,7 +327,7 @@ def _to_be_judged(split: Split) -> str:
         return split.early.advice[0].lower() + split.early.advice[1:]
     if split.floor_m is not None:
         return MORE_LANDINGS
-    return "say the noise of the sensor, --noise-m, or record the stem at rest, the command held for 40 samples"
+    return "give the noise of the sensor, --noise-m, or record the stem at rest: hold the command for 40 samples"
 
 
 def _advice(diagnosis: Diagnosis) -> list[str]:
@@ -334,7 +337,9 @@ def _advice(diagnosis: Diagnosis) -> list[str]:
     if diagnosis.verdict == "missing":
         advice.append("put the extended valve file into use, and compare it with a recording of another day")
     if diagnosis.verdict == "one_of":
-        advice.append("no input tells these apart; measure what lies between them, such as the actuator pressure")
+        advice.append(
+            "no input tells these apart; measure the actuator pressure, or another quantity between the two effects"
+        )
     if diagnosis.verdict in ("unexplained", "untrusted"):
         advice.append(
             "record again with slow ramps, steps of several heights and restarts in the same direction after holds"
@@ -345,13 +350,9 @@ def _advice(diagnosis: Diagnosis) -> list[str]:
     if diagnosis.verdict == "unfinished":
         advice.append("let the diagnosis run through, or name fewer effects, --effects")
     if diagnosis.split.train.record.pressure_pa is None and diagnosis.verdict != "adequate":
-        advice.append(
-            "record the actuator pressure too: it parts what happens before the actuator from what happens at the stem"
-        )
+        advice.append("record the actuator pressure, too: it tells effects before the actuator from those at the stem")
     if diagnosis.split.train.record.repeatability_m is None:
-        advice.append(
-            "let the command repeat a stretch of at least some seconds: how well the valve repeats is the floor"
-        )
+        advice.append("let the command repeat a stretch of some seconds: this shows the repeatability of the valve")
     return advice
 
 
@@ -381,12 +382,10 @@ def _undetectable(diagnosis: Diagnosis) -> Html:
     ]
     said += [each.sentence for each in undetectable(diagnosis.split, best.valve)]
     if not best.trusted:
-        said.append("searches from independent starts do not come to the same parameters: a better fit may exist")
-    said.append(
-        "only ratios of forces can be read from pressure and position: the diaphragm area is taken from the valve file"
-    )
+        said.append("searches from independent starts end at different parameters: a better fit may exist")
+    said.append("pressure and position show ratios of forces only: the diaphragm area is that of the valve file")
     said.append("an effect that does not show under this recording's inputs may still be there")
-    return section("undetectable", "What the recording does not tell", bullets(said))
+    return section("undetectable", "What the recording cannot show", bullets(said))
 
 
 def _preview(diagnosis: Diagnosis) -> Html:
@@ -394,6 +393,9 @@ def _preview(diagnosis: Diagnosis) -> Html:
     return fold_parts(
         "preview",
         "For specialists: the first guess, before any effect was fitted",
-        text("Share of the error that a weak effect of each kind would explain: a guess, right in about two of three."),
+        text(
+            "Share of the error that a weak effect of each kind would explain. It names the right effect in some two "
+            "of three cases."
+        ),
         table("table-preview", ["Effect", "Share"], rows),
     )

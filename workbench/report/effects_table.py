@@ -14,10 +14,10 @@ from workbench.select.equivalence import classes, distinguishing_record
 VERDICTS = {
     "adequate": ("good", "Nothing is missing that this recording could show."),
     "missing": ("good", "The missing effect is found."),
-    "one_of": ("open", "It is one of several effects; this recording does not tell which."),
+    "one_of": ("open", "It is one of several effects; this recording cannot show which."),
     "unexplained": ("bad", "Something is missing that no effect here explains."),
-    "unjudged": ("open", "Of this recording nobody can say whether anything is missing."),
-    "unfinished": ("open", "Broken off: this is what was known by then."),
+    "unjudged": ("open", "This recording cannot show whether anything is missing."),
+    "unfinished": ("open", "Broken off: the results until then."),
     "untrusted": ("bad", "The fit is not to be trusted: searches from different starts disagree."),
 }
 KINDS = {"added": "good", "as good": "set"}
@@ -36,7 +36,7 @@ class RankedStep:
 def headline(verdict: str, missing: Sequence[str], *, parameters_off: bool = False) -> tuple[str, str]:
     """Return how a verdict is marked, and its first words; `parameters_off`: nothing is missing, once refitted."""
     if parameters_off:
-        return "open", "No effect is missing: the parameters were off."
+        return "open", "No effect is missing: the parameters were wrong."
     if verdict == "missing" and len(missing) > 1:
         return "good", "The missing effects are found."
     return VERDICTS[verdict]
@@ -121,7 +121,7 @@ def not_told_apart(
     """Return the section of what could not be told apart; `otherwise` where the effects' files say nothing of it."""
     title = "What could not be told apart"
     if not sets:
-        nothing = "Nothing: no other effect comes within reach of the one that was added."
+        nothing = "No other effect explains the recording as well as the one that was added."
         return section("indistinguishable", title, text(nothing if missing else NO_QUESTION))
     library = {name: _effect(name) for name in tried}
     rows = [
@@ -135,13 +135,13 @@ def not_told_apart(
         title,
         text(
             f"These explain the recording equally well: {'; '.join(' or '.join(names) for names in sets)}. "
-            "That is as far as it can tell. One of each set was added to go on with; it is not proved."
+            "This recording cannot show which it is. One of each set was added; it is not proved."
         ),
-        table("table-indistinguishable", ["This", "or this", "What record would tell"], rows, (0, 1, 2)),
+        table("table-indistinguishable", ["This", "or this", "What would tell them apart"], rows, (0, 1, 2)),
     )
 
 
-NO_QUESTION = "The question does not arise: no effect was accepted."
+NO_QUESTION = "No effect was accepted."
 
 
 def _two(name: str, other: str, library: Mapping[str, Effect], otherwise: str) -> Row:

@@ -46,9 +46,9 @@ BALANCE = {
 }
 FORCE_WORDS = {
     "Balance": "While the stem moves, the force that is measured equals spring, friction and the pressure's share. "
-    "What the balance leaves over is its error.",
+    "The rest is the error of the balance.",
     "rms": WORDS["rms"],
-    "Floor": "How well strokes over the same place, the same way, repeat each other: no balance does better.",
+    "Floor": "By how much strokes over the same place in the same direction differ: no balance does better.",
     **{word: DIAGNOSIS_WORDS[word] for word in ("Effect", "Fitted, held out", "Evidence")},
     "Std": "Standard deviation of a parameter over fits that each leave a part of the data out.",
 }
@@ -162,13 +162,13 @@ def _friction(diagnosis: ForceDiagnosis, measured_n: Column) -> Html:
     thinned = f" Every {every}th row is drawn; the figures are of all {len(rows)}." if every > 1 else ""
     return section(
         "friction",
-        "Friction, as spring and pressure leave it over",
+        "Friction: what spring and pressure leave",
         plot(
             "plot-friction",
             figure,
             420,
-            "The force that spring, pressure and constant force leave over, positive while opening: as measured, and "
-            f"as the balance with all that was added has it.{thinned}",
+            "The measured force less spring, pressure and constant force, positive while opening; and the same by the "
+            f"balance with all that was added.{thinned}",
         ),
     )
 
@@ -199,8 +199,8 @@ def _where(diagnosis: ForceDiagnosis) -> Html:
         "where",
         "Where it failed, and what is left",
         text(
-            "The error counted against the motion: positive, the stem resists more than the balance has it. "
-            "Means, bars: ± 1 standard error; of a static curve each reading."
+            "The error, counted against the motion: positive where the stem resists more than the balance says. "
+            "Means with ± 1 standard error; of a static curve each reading."
         ),
         pair(*(_profile(name, title, over, factor, kept, rows, fits) for name, title, over, factor, kept in places)),
     )

@@ -24,10 +24,10 @@ from workbench.report.units import Reading, Shown, times
 
 WORDS = {
     "As given": "The valve file as it was before the step, nothing fitted.",
-    "Refitted": "Its own parameters fitted to the recording, nothing added: what the effect has to beat.",
+    "Refitted": "Its own parameters fitted to the recording, nothing added: an effect must do better than this.",
     "Fitted, held out": "The error, rms, on the data that the parameters were fitted to, and on data held back.",
-    "Floor": "The error that no model can undercut: the noise of the position sensor, or how well the valve repeats "
-    "itself, whichever is more.",
+    "Floor": "The least error that any model can have: the noise of the position sensor or the repeatability of the "
+    "valve, whichever is more.",
 }
 
 

@@ -53,7 +53,7 @@ class Gain:
             return f"may be chance: evidence {self.bic:.3g}, more than {self.least:g} needed"
         if self.held_out_evidence <= LEAST_HELD_OUT:
             return (
-                f"what was held out does not show it: evidence {self.held_out_evidence:.3g} there, "
+                f"the held-out part does not show it: evidence {self.held_out_evidence:.3g} there, "
                 f"more than {LEAST_HELD_OUT:g} needed"
             )
         return ""

@@ -278,7 +278,7 @@ def _beyond(name: str, found: Fit, effect: Effect) -> str:
         parameter = found.parameters.get(f"{effect.name}.{key}")
         if parameter and not parameter.physical and _at_end(parameter.value, declared, found.valve.valve):
             return (
-                f"not physical: the recording wants {name}.{key} beyond {parameter.value:.4g}, "
+                f"not physical: the fit takes {name}.{key} beyond {parameter.value:.4g}, "
                 f"the end of its range from {declared.least:g} to {declared.most:g}"
             )
     return ""

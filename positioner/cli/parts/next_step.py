@@ -62,9 +62,9 @@ def not_written(path: Path, diagnosis: "Diagnosis") -> str:
         "adequate": "nothing is missing",
         "missing": "the measured pressure is on another scale than the command",
         "one_of": "several effects do as well; choose by one of the commands",
-        "unexplained": "what was found does not explain the recordings",
-        "unjudged": "of these recordings nobody can say whether anything is missing",
+        "unexplained": "the effects found do not explain the recordings",
+        "unjudged": "these recordings cannot show whether anything is missing",
         "unfinished": "the diagnosis was broken off",
-        "untrusted": "what was found is not to be trusted",
+        "untrusted": "the fit is not to be trusted",
     }
     return f"{path}: not written: {why[diagnosis.verdict]}"
