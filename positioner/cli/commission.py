@@ -11,7 +11,7 @@ from config.toml_text import with_values
 from config.whole_file import replace_whole
 from positioner.cli.parts.breaking_off import end_as_by_ctrl_c
 from positioner.cli.parts.config_argument import add_config, config_file
-from positioner.cli.parts.output_files import writable, write_json
+from positioner.cli.parts.output_files import write_json
 from positioner.cli.parts.own_valve import own_valve, unknown_travel
 from positioner.cli.parts.valve_test import kept
 
@@ -52,7 +52,6 @@ def run(arguments: argparse.Namespace) -> int:
     from positioner.control.settings import Settings
     from positioner.tests_on_the_valve.commissioning import commission
 
-    writable(arguments.json, "--json")
     path = arguments.config = config_file(arguments)
     file = _file(path, arguments.name)
     print(WARNING)

@@ -6,7 +6,7 @@ from pathlib import Path
 from positioner.cli.parts.fit_arguments import add_noise_and_exports, read_with_noise
 from positioner.cli.parts.model_arguments import read_valve
 from positioner.cli.parts.naming import naming
-from positioner.cli.parts.output_files import writable, write_json
+from positioner.cli.parts.output_files import write_json
 from positioner.cli.parts.progress import at_work
 
 HELP = "simulate a recording and print where the model fails; exit status 1 if it is not adequate"
@@ -26,8 +26,6 @@ def run(arguments: argparse.Namespace) -> int:
     """Compare and print; 0 if the model is adequate, else 1."""
     from workbench.compare.comparison import compare
 
-    writable(arguments.json, "--json")
-    writable(arguments.report, "--report")
     valve = read_valve(arguments.valve)
     recording = read_with_noise(arguments.recording, arguments, valve)
     named = {"recording": str(arguments.recording), "valve file": arguments.valve}

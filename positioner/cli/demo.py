@@ -34,7 +34,7 @@ from config.registers import STATISTICS
 from positioner.cli.parts.children import port_in
 from positioner.cli.parts.clone_only import benchmark
 from positioner.cli.parts.demo_folder import demo_folder, recording_in
-from positioner.cli.parts.output_files import writable, write_json
+from positioner.cli.parts.output_files import write_json
 from positioner.cli.parts.passing_line import passing
 from positioner.cli.parts.simulated_plant import (
     AGEING,
@@ -211,7 +211,6 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
 
 def run(arguments: argparse.Namespace) -> int:
     """Run it; exit status 1 when a step ends too far off, or a ratio is identified too badly."""
-    writable(arguments.json, "--json")
     if arguments.loop:
         if arguments.json:
             raise InputError("--json", "with --loop flow there is none")

@@ -77,7 +77,7 @@ def run(arguments: argparse.Namespace) -> int:
     from workbench.diagnosis.diagnosis_json import as_json
     from workbench.report import Subject, report_diagnosis, require_plotly
 
-    for option in ("json", "report", "experiment", "out"):
+    for option in ("experiment", "out"):
         writable(getattr(arguments, option), f"--{option}")
     _require_out(arguments)
     take_mapping(arguments)

@@ -42,8 +42,6 @@ def run(arguments: argparse.Namespace) -> int:
     from workbench.discover.discovery_json import as_json
 
     _require_new(arguments.out)
-    for option in ("picture", "json"):
-        writable(getattr(arguments, option), f"--{option}")
     if arguments.picture is not None:
         import_extra("matplotlib.pyplot", "--picture")
     valve = read_valve(arguments.valve)

@@ -6,7 +6,7 @@ from typing import TYPE_CHECKING, Any
 
 from positioner.cli.parts.export_arguments import add_export_arguments, read_any
 from positioner.cli.parts.naming import naming
-from positioner.cli.parts.output_files import writable, write_json
+from positioner.cli.parts.output_files import write_json
 from positioner.cli.parts.progress import at_work
 
 if TYPE_CHECKING:
@@ -36,7 +36,6 @@ def run(arguments: argparse.Namespace) -> int:
     """Estimate and print; 0 if the ratios that the law needs are valid, else 1."""
     from positioner.estimation.recording_estimates import estimate
 
-    writable(arguments.json, "--json")
     held = None if arguments.pressure is None else arguments.pressure == "held"
     recording = read_any(arguments.recording, arguments, None)
     what = f"{len(recording)} samples are read, identifying from them"

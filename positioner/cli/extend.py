@@ -43,8 +43,6 @@ def run(arguments: argparse.Namespace) -> int:
     from workbench.report import report_journal, require_plotly
 
     writable(arguments.out, "-o")
-    writable(arguments.json, "--json")
-    writable(arguments.report, "--report")
     if arguments.report is not None:
         require_plotly(arguments.report)
     began_s = time.monotonic()

@@ -7,7 +7,6 @@ from typing import TYPE_CHECKING
 
 from config.errors import InputError
 from config.extras import import_extra
-from positioner.cli.parts.output_files import writable
 
 if TYPE_CHECKING:
     from workbench.fleet.examination import Examination
@@ -56,8 +55,6 @@ def run(arguments: argparse.Namespace) -> int:
     from workbench.fleet.tables import write_tables
     from workbench.report import require_plotly
 
-    writable(arguments.report, "--report")
-    writable(arguments.picture, "--picture")
     if arguments.picture is not None:
         import_extra("matplotlib.pyplot", "--picture")
         if arguments.since is None:

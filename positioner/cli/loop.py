@@ -5,7 +5,7 @@ from dataclasses import asdict
 from pathlib import Path
 
 from positioner.cli.parts.loop_arguments import add_loop_arguments, read_record
-from positioner.cli.parts.output_files import writable, write_json
+from positioner.cli.parts.output_files import write_json
 from positioner.cli.parts.progress import at_work
 
 HELP = "tell from OP, PV and SP alone whether a valve sticks; exit status 1 if it sticks or is undecided"
@@ -29,8 +29,6 @@ def run(arguments: argparse.Namespace) -> int:
     from workbench.loops.loop_report import report_loop
     from workbench.report import require_plotly
 
-    writable(arguments.json, "--json")
-    writable(arguments.report, "--report")
     if arguments.report is not None:
         require_plotly(arguments.report)
     found = []

@@ -6,7 +6,7 @@ from pathlib import Path
 
 from config.errors import InputError
 from config.results.block import as_text
-from positioner.cli.parts.output_files import writable, write_json
+from positioner.cli.parts.output_files import write_json
 
 HELP = "rank the loops of a plant from OP, PV and SP alone; exit status 1 if any valve sticks"
 EXAMPLE = "positioner loops plant.csv --report plant.html"
@@ -29,8 +29,6 @@ def run(arguments: argparse.Namespace) -> int:
     from workbench.loops.plant import diagnose_plant, read_manifest
     from workbench.report import require_plotly
 
-    writable(arguments.json, "--json")
-    writable(arguments.report, "--report")
     if arguments.report is not None:
         require_plotly(arguments.report)
     if arguments.workers is not None and arguments.workers < 1:

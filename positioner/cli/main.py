@@ -43,14 +43,14 @@ def _run_command(words: Sequence[str] | None) -> int:
     """Run one command, now that what it imports is known to be ours."""
     from config.errors import CommandFailed, InputError
     from config.extras import name_missing_extra
-    from positioner.cli.parts.output_files import refuse_own_inputs
+    from positioner.cli.parts.output_files import check_outputs
 
     _escape_what_cannot_be_shown()
     who = "positioner"
     try:
         arguments = _understood(words)
         who = f"positioner {arguments.command}"
-        refuse_own_inputs(arguments)
+        check_outputs(arguments)
         status = int(arguments.run(arguments))
         sys.stdout.flush()
         return status

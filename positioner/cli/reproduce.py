@@ -8,7 +8,7 @@ from pathlib import Path
 
 from config.errors import InputError
 from positioner.cli.parts.clone_only import benchmark
-from positioner.cli.parts.output_files import make_folder, writable
+from positioner.cli.parts.output_files import make_folder
 
 HELP = "print the paper's figures and claims, in two minutes; needs a clone of the project"
 EXAMPLE = "positioner reproduce --out figures --json reproduced.json"
@@ -26,7 +26,6 @@ def run(arguments: argparse.Namespace) -> int:
 
     if arguments.seeds < 2:
         raise InputError("--seeds", f"must be at least 2, it is {arguments.seeds}")
-    writable(arguments.json, "--json")
     if arguments.out:
         make_folder(arguments.out)
     status: int = benchmark("paper", "reproduce").reproduced(arguments.out, arguments.json, arguments.seeds)

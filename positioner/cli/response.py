@@ -4,7 +4,7 @@ import argparse
 from pathlib import Path
 
 from positioner.cli.parts.export_arguments import add_export_arguments, read_any
-from positioner.cli.parts.output_files import writable, write_json
+from positioner.cli.parts.output_files import write_json
 from positioner.cli.parts.progress import at_work
 
 HELP = "print dead time, T63, T86, dead band and so on of a recording; exit status 1 if it holds no step"
@@ -25,7 +25,6 @@ def run(arguments: argparse.Namespace) -> int:
 
     from positioner.response import as_json, respond
 
-    writable(arguments.json, "--json")
     recording = read_any(arguments.recording, arguments, None)
     with at_work("response", f"finding the steps of {len(recording)} samples"):
         response = respond(recording)

@@ -8,6 +8,8 @@ from typing import Any
 
 from workbench.diagnosis.diagnosis import Diagnosis
 from workbench.fit.fitted_parameter import parameters_json
+from workbench.select.block_errors import errors_json
+from workbench.select.candidate_table import candidate_json
 from workbench.select.effect_candidates import EffectCandidate, EvaluatedModel
 from workbench.select.equivalence import undetectable
 
@@ -71,7 +73,7 @@ def as_json(diagnosis: Diagnosis) -> dict[str, Any]:
 def _model(model: EvaluatedModel) -> dict[str, Any]:
     return {
         "effects": list(model.effects),
-        **_errors(model),
+        **errors_json(model.errors),
         "at_floor": model.at_floor,
         "structure_r2": model.errors.structure,
         "pressure_off_pa": model.pressure.rms_pa if model.pressure else None,
@@ -79,28 +81,7 @@ def _model(model: EvaluatedModel) -> dict[str, Any]:
     }
 
 
-def _errors(model: EvaluatedModel) -> dict[str, float]:
-    return {
-        "train_rmse_m": model.errors.train_rmse_m,
-        "test_rmse_m": model.errors.test_rmse_m,
-        "test_typical_rmse_m": model.errors.test_block_m,
-    }
-
-
 def _candidate(candidate: EffectCandidate) -> dict[str, Any]:
     """An effect that could not be fitted has neither errors nor parameters."""
-    model, found = candidate.model, candidate.gain
-    return {
-        "step": candidate.step,
-        "name": candidate.name,
-        "train_rmse_m": model and model.errors.train_rmse_m,
-        "test_rmse_m": model and model.errors.test_rmse_m,
-        "test_typical_rmse_m": model and model.errors.test_block_m,
-        "evidence": found and found.bic,
-        "held_out_gain": found and found.held_out,
-        "held_out_evidence": found and found.held_out_evidence,
-        "parameters": parameters_json(model.fit.parameters) if model else {},
-        "physical": candidate.physical,
-        "accepted": candidate.accepted,
-        "why_not": candidate.rejection_reason,
-    }
+    parameters = parameters_json(candidate.model.fit.parameters) if candidate.model else {}
+    return candidate_json(candidate.tried) | {"parameters": parameters, "physical": candidate.physical}

@@ -5,6 +5,8 @@ from typing import Any
 from workbench.discover.discovery import Discovery
 from workbench.discover.found_form import FoundForm
 from workbench.fit.fitted_parameter import parameters_json
+from workbench.select.block_errors import errors_json
+from workbench.select.candidate_table import candidate_json
 
 
 def as_json(found: Discovery) -> dict[str, Any]:
@@ -13,20 +15,10 @@ def as_json(found: Discovery) -> dict[str, Any]:
         "outcome": found.outcome,
         "sentence": found.sentence,
         "floor_m": found.split.floor_m,
-        "base": {"train_rmse_m": found.base.errors.train_rmse_m, "test_rmse_m": found.base.errors.test_rmse_m},
+        "base": errors_json(found.base.errors),
         "forms": [_form(each) for each in found.found],
         "candidates": [
-            {
-                "name": each.name,
-                "train_rmse_m": each.model and each.model.errors.train_rmse_m,
-                "test_rmse_m": each.model and each.model.errors.test_rmse_m,
-                "evidence": each.gain and each.gain.bic,
-                "held_out_gain": each.gain and each.gain.held_out,
-                "held_out_evidence": each.gain and each.gain.held_out_evidence,
-                "explains": each.model is not None and each.model.explained,
-                "accepted": each.accepted,
-                "why_not": each.rejection_reason,
-            }
+            candidate_json(each.tried) | {"explains": each.model is not None and each.model.explained}
             for each in found.candidates
         ],
         "not_fitted": list(found.untried),
@@ -38,7 +30,6 @@ def as_json(found: Discovery) -> dict[str, Any]:
 
 
 def _form(each: FoundForm) -> dict[str, Any]:
-    errors = each.model.errors
     return {
         "name": each.form.name,
         "words": each.form.words,
@@ -48,7 +39,6 @@ def _form(each: FoundForm) -> dict[str, Any]:
         "unit": each.added.unit,
         "from": each.span[0],
         "to": each.span[1],
-        "train_rmse_m": errors.train_rmse_m,
-        "test_rmse_m": errors.test_rmse_m,
+        **errors_json(each.model.errors),
         "parameters": parameters_json(each.model.fit.parameters),
     }

@@ -42,6 +42,12 @@ class ForceCandidate(Candidate):
     fit: ForceFit
     gain: Gain
 
+    @property
+    def tried(self) -> Tried:
+        """Its row of the table."""
+        errors_n = (self.fit.train_rms_n, self.fit.test_rms_n, self.fit.median_error_n)
+        return Tried(self.step, self.name, *errors_n, self.gain, self.rejection_reason)
+
 
 ForceStep = ForwardStep[ForceFit, ForceCandidate]
 
@@ -66,7 +72,7 @@ class ForceDiagnosis(Result, ForwardSelection[ForceFit, ForceCandidate]):
             title = (
                 f"step {number}: error {before.train_rms_n:.4g} N rms fitted, {before.test_rms_n:.4g} held out{floor}"
             )
-            said.append(candidate_table([_describe_trial(each) for each in step.candidates], NEWTONS, title))
+            said.append(candidate_table([each.tried for each in step.candidates], NEWTONS, title))
         rows = [
             (name, f"{value:.6g}", "" if std is None else f"{std:.2g}")
             for name, value in self.best.parameters.items()
@@ -79,19 +85,14 @@ class ForceDiagnosis(Result, ForwardSelection[ForceFit, ForceCandidate]):
 
     def frame_columns(self) -> dict[str, list[object]]:
         """Return a row a candidate of each step: errors, N, evidence, accepted or why not."""
-        return candidate_columns([_describe_trial(each) for each in self.candidates], NEWTONS)
+        return candidate_columns([each.tried for each in self.candidates], NEWTONS)
 
     def plot(self) -> "Figure":
         """Draw the held-out error with each effect in the first step; those added and their rivals in colour."""
         step = self.steps[0]
         chosen = {*self.missing, *(each.name for each in step.indistinguishable)}
-        tried = [_describe_trial(each) for each in step.candidates]
+        tried = [each.tried for each in step.candidates]
         return draw_race(tried, chosen, step.before.test_rms_n, self.floor_n, NEWTONS)
-
-
-def _describe_trial(each: ForceCandidate) -> Tried:
-    errors = (each.fit.train_rms_n, each.fit.test_rms_n, each.fit.median_error_n)
-    return Tried(each.step, each.name, *errors, each.gain, each.rejection_reason)
 
 
 @kinds_held

@@ -5,6 +5,7 @@ from typing import Any
 
 from workbench.forces.force_balance import ForceFit
 from workbench.forces.force_diagnosis import ForceCandidate, ForceDiagnosis
+from workbench.select.candidate_table import NEWTONS, candidate_json
 
 
 def as_json(diagnosis: ForceDiagnosis) -> dict[str, Any]:
@@ -34,14 +35,4 @@ def _fit(fit: ForceFit) -> dict[str, Any]:
 
 
 def _candidate(each: ForceCandidate) -> dict[str, Any]:
-    return {
-        "step": each.step,
-        "name": each.name,
-        **_fit(each.fit),
-        "evidence": each.gain.bic,
-        "held_out_gain": each.gain.held_out,
-        "held_out_evidence": each.gain.held_out_evidence,
-        "physical": not each.fit.range_violation,
-        "accepted": each.accepted,
-        "why_not": each.rejection_reason,
-    }
+    return _fit(each.fit) | candidate_json(each.tried, NEWTONS) | {"physical": not each.fit.range_violation}

@@ -19,8 +19,7 @@ from workbench.page.effect_panel import effect_section
 from workbench.page.explained import ADDING_CELL, EFFECT_CELL, about_effect, word
 from workbench.page.search import Search
 from workbench.report.charts import EXTENDED, MEASURED, axis, layout, mark_line
-from workbench.report.diagnosis_report import ranks
-from workbench.report.effects_table import headline
+from workbench.report.effects_table import headline, ranks
 from workbench.report.ranking import log_ticks
 
 PANEL_LOOK_S = 0.2
@@ -271,12 +270,12 @@ class SearchPanel:
         columns = [{"name": key, "label": head, "field": key, "align": "left"} for key, head in heads.items()]
         rows = [
             {
-                "effects": diagnosis.with_those_before(number, each.name),
-                "effect": self._desk.plain(each.name),
-                "about": about_effect(each.name),
-                "fitted": of.shown(each.train).text,
-                "test": of.shown(each.test).text,
-                "bic": "–" if each.evidence is None else f"{each.evidence:.1f}",
+                "effects": diagnosis.with_those_before(number, each.tried.name),
+                "effect": self._desk.plain(each.tried.name),
+                "about": about_effect(each.tried.name),
+                "fitted": of.shown(each.tried.train).text,
+                "test": of.shown(each.tried.test).text,
+                "bic": "–" if each.tried.gain is None else f"{each.tried.gain.bic:.1f}",
                 "outcome": each.said,
             }
             for each in sorted(ranks(step), key=lambda each: each.order)

@@ -16,7 +16,7 @@ from workbench.model.sampling import MORE_LANDINGS
 from workbench.report import ranking
 from workbench.report.charts import EXTENDED, MODEL, QUIET, axis, layout, line
 from workbench.report.comparison_report import MEANINGS, WORDS, facts, overlaid, recording
-from workbench.report.effects_table import RankedStep, headline, not_told_apart, outcome, show_added, show_tried
+from workbench.report.effects_table import RankedStep, headline, not_told_apart, ranks, show_added, show_tried
 from workbench.report.overlay import HELD_OUT, Mask, Shade, Simulated, overlay
 from workbench.report.page import (
     Html,
@@ -36,11 +36,10 @@ from workbench.report.page import (
     write,
 )
 from workbench.report.plot_series import draw_series, round_values
-from workbench.report.ranking import RankedEffect
 from workbench.report.signature_loop import signature
 from workbench.report.units import Reading, Shown, of_stroke, times
 from workbench.select.effect_acceptance import LEAST_BIC, LEAST_HELD_OUT
-from workbench.select.effect_candidates import EffectCandidate, EffectStep, EvaluatedModel
+from workbench.select.effect_candidates import EffectCandidate, EvaluatedModel
 from workbench.select.equivalence import undetectable
 from workbench.select.experiment import Experiment
 
@@ -251,23 +250,6 @@ def _where(validation: _Validation) -> Html:
 def _ranking(diagnosis: Diagnosis, validation: _Validation) -> Html:
     steps = [RankedStep(step.before.effects, step.before.errors.test_rmse_m, ranks(step)) for step in diagnosis.steps]
     return show_tried(steps, validation.floor_m, Reading(diagnosis.kind).errors)
-
-
-def ranks(step: EffectStep) -> list[RankedEffect]:
-    """Return what came of each effect of a step."""
-    added, rivals = step.added.name if step.added else "", [each.name for each in step.indistinguishable]
-    return [
-        RankedEffect(
-            each.name,
-            each.model.errors.test_rmse_m if each.model else None,
-            each.model.errors.train_rmse_m if each.model else None,
-            each.gain.held_out_evidence if each.gain else None,
-            each.gain.bic if each.gain else None,
-            outcome(each.name, added, rivals, refused=not each.accepted),
-            each.rejection_reason,
-        )
-        for each in step.candidates
-    ]
 
 
 def _section_of_added(diagnosis: Diagnosis) -> Html:

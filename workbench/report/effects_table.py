@@ -10,6 +10,7 @@ from workbench.report.ranking import RankedEffect
 from workbench.report.units import Quantity
 from workbench.select.effect_acceptance import LEAST_BIC, LEAST_HELD_OUT
 from workbench.select.equivalence import classes, distinguishing_record
+from workbench.select.forward_selection import Candidate, CandidateT, FittedT, ForwardStep
 
 VERDICTS = {
     "adequate": ("good", "Nothing is missing that this recording could show."),
@@ -42,13 +43,17 @@ def headline(verdict: str, missing: Sequence[str], *, parameters_off: bool = Fal
     return VERDICTS[verdict]
 
 
-def outcome(name: str, added: str, indistinguishable: Collection[str], *, refused: bool) -> str:
-    """Return what came of an effect."""
-    if name == added:
-        return "added"
-    if name in indistinguishable:
-        return "as good"
-    return "refused" if refused else "accepted"
+def ranks(step: ForwardStep[FittedT, CandidateT]) -> list[RankedEffect]:
+    """Return what came of each effect of a step."""
+
+    def outcome(each: Candidate) -> str:
+        if step.added and each.name == step.added.name:
+            return "added"
+        if each.name in {rival.name for rival in step.indistinguishable}:
+            return "as good"
+        return "accepted" if each.accepted else "refused"
+
+    return [RankedEffect(each.tried, outcome(each)) for each in step.candidates]
 
 
 def show_tried(steps: Sequence[RankedStep], floor: float | None, of: Quantity) -> Html:
@@ -92,14 +97,14 @@ def show_tried(steps: Sequence[RankedStep], floor: float | None, of: Quantity) -
 def _row_of(each: RankedEffect, of: Quantity) -> Row:
     return Row(
         [
-            each.name,
+            each.tried.name,
             each.said,
-            of.shown(each.test),
-            of.shown(each.train),
-            "–" if each.held_out_evidence is None else f"{each.held_out_evidence:.3g}",
-            "–" if each.evidence is None else f"{each.evidence:.4g}",
+            of.shown(each.tried.test),
+            of.shown(each.tried.train),
+            "–" if each.tried.gain is None else f"{each.tried.gain.held_out_evidence:.3g}",
+            "–" if each.tried.gain is None else f"{each.tried.gain.bic:.4g}",
         ],
-        _effect(each.name).text.rstrip("."),
+        _effect(each.tried.name).text.rstrip("."),
         KINDS.get(each.outcome, ""),
     )
 

@@ -9,12 +9,12 @@ from config.recording import Column
 from workbench.compare.residuals import BINS, FEWEST_BIN_ROWS, Profile, profile
 from workbench.data.imposed_motion import Rows
 from workbench.forces.force_balance import ForceFit, balanced_n, carried_n
-from workbench.forces.force_diagnosis import BALANCE_FLOORS, ForceDiagnosis, ForceStep
+from workbench.forces.force_diagnosis import BALANCE_FLOORS, ForceDiagnosis
 from workbench.report import ranking
 from workbench.report.charts import EXTENDED, MEASURED, MODEL, QUIET, Figure, axis, layout, line, profiles
 from workbench.report.comparison_report import WORDS
 from workbench.report.diagnosis_report import DIAGNOSIS_WORDS
-from workbench.report.effects_table import RankedStep, headline, not_told_apart, outcome, show_added, show_tried
+from workbench.report.effects_table import RankedStep, headline, not_told_apart, ranks, show_added, show_tried
 from workbench.report.page import (
     Html,
     Row,
@@ -32,7 +32,6 @@ from workbench.report.page import (
     write,
 )
 from workbench.report.plot_series import round_values
-from workbench.report.ranking import RankedEffect
 from workbench.report.units import FORCE, Shown, force, parameter, times
 
 DRAWN_ROWS = 6_000
@@ -231,24 +230,8 @@ def _means(over: Column, values: Column) -> Profile:
 
 
 def _ranking(diagnosis: ForceDiagnosis) -> Html:
-    steps = [RankedStep(step.before.effects, step.before.test_rms_n, _list_tried(step)) for step in diagnosis.steps]
+    steps = [RankedStep(step.before.effects, step.before.test_rms_n, ranks(step)) for step in diagnosis.steps]
     return show_tried(steps, None, FORCE)
-
-
-def _list_tried(step: ForceStep) -> list[RankedEffect]:
-    added, rivals = step.added.name if step.added else "", [each.name for each in step.indistinguishable]
-    return [
-        RankedEffect(
-            each.name,
-            each.fit.test_rms_n,
-            each.fit.train_rms_n,
-            each.gain.held_out_evidence,
-            each.gain.bic,
-            outcome(each.name, added, rivals, refused=not each.accepted),
-            each.rejection_reason,
-        )
-        for each in step.candidates
-    ]
 
 
 def _parameters(diagnosis: ForceDiagnosis) -> Html:

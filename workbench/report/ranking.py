@@ -8,6 +8,7 @@ import numpy as np
 from workbench.report.charts import EXTENDED, INK, MEASURED, OPEN, QUIET, Figure, axis, layout, mark_line
 from workbench.report.plot_series import significant
 from workbench.report.units import Quantity
+from workbench.select.candidate_table import Tried
 
 OUTCOMES = {
     "added": (EXTENDED, "circle"),
@@ -22,36 +23,30 @@ STEPS = ((1, 2, 5), (1, 1.5, 2, 3, 4, 5, 6, 7, 8, 9), (1, 1.2, 1.4, 1.6, 1.8, 2,
 
 @dataclass(frozen=True, slots=True)
 class RankedEffect:
-    """An effect and what came of it; errors, SI, None where it could not be fitted."""
+    """An effect tried, and what came of it."""
 
-    name: str
-    test: float | None
-    train: float | None
-    held_out_evidence: float | None
-    """By how many standard errors the held-out error falls."""
-    evidence: float | None
+    tried: Tried
     outcome: str
-    why: str
 
     @property
     def order(self) -> tuple[int, float]:
         """Added first, then as good, accepted, refused; inside these by held-out error."""
-        return ORDER.index(self.outcome), np.inf if self.test is None else self.test
+        return ORDER.index(self.outcome), np.inf if self.tried.test is None else self.tried.test
 
     @property
     def said(self) -> str:
         """The outcome, and why it is no better."""
-        return f"{self.outcome}: {self.why}" if self.why else self.outcome
+        return f"{self.outcome}: {self.tried.rejection_reason}" if self.tried.rejection_reason else self.outcome
 
 
 def ranking(tried: Sequence[RankedEffect], before: float, floor: float | None, of: Quantity) -> Figure:
     """Return the held-out errors on a logarithmic scale."""
-    names = [each.name for each in tried]
+    names = [each.tried.name for each in tried]
     lines = [(before, QUIET, "dot")] if floor is None else [(before, QUIET, "dot"), (floor, INK, "dash")]
     shown = [of.factor * each for each in (*(value for value, _, _ in lines), *_errors(tried))]
     traces = []
     for outcome, (colour, symbol) in OUTCOMES.items():
-        part = [each for each in tried if each.outcome == outcome and each.test is not None]
+        part = [each for each in tried if each.outcome == outcome and each.tried.test is not None]
         if part:
             errors = np.array(_errors(part), np.float64)
             traces.append(
@@ -61,7 +56,7 @@ def ranking(tried: Sequence[RankedEffect], before: float, floor: float | None, o
                     "orientation": "h",
                     "name": outcome,
                     "x": significant(of.factor * errors),
-                    "y": [each.name for each in part],
+                    "y": [each.tried.name for each in part],
                     "customdata": significant(errors),
                     "marker": {"color": colour, "symbol": symbol, "size": 10, "line": {"width": 2, "color": colour}},
                     "hovertemplate": f"%{{y}}: %{{x:.4~g}} {of.unit} (%{{customdata:.4~g}} {of.si})"
@@ -80,7 +75,7 @@ def ranking(tried: Sequence[RankedEffect], before: float, floor: float | None, o
 
 
 def _errors(tried: Sequence[RankedEffect]) -> list[float]:
-    return [each.test for each in tried if each.test is not None]
+    return [each.tried.test for each in tried if each.tried.test is not None]
 
 
 def log_ticks(values: Sequence[float]) -> Figure:

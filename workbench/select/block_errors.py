@@ -107,6 +107,15 @@ class BlockErrors(Brief):
         return max(self.train_block_m, self.test_block_m) <= MOST_LEFT * motion_std_m
 
 
+def errors_json(errors: BlockErrors) -> dict[str, float]:
+    """Return what JSON says of errors, m."""
+    return {
+        "train_rmse_m": errors.train_rmse_m,
+        "test_rmse_m": errors.test_rmse_m,
+        "test_typical_rmse_m": errors.test_block_m,
+    }
+
+
 def block_errors(fit: Fit, split: Split) -> BlockErrors:
     """Return how far a fit is off on what it was fitted to, and on what was held out.
 

@@ -1,8 +1,8 @@
-"""What a forward selection has tried, as tables, as columns and as a figure: by simulation in m, by forces in N."""
+"""What a forward selection has tried: tables, columns, JSON and a figure; by simulation in m, by forces in N."""
 
 from collections.abc import Collection, Sequence
 from dataclasses import dataclass
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Any
 
 from config.drive import VALVE, Kind, Scale
 from config.results.block import Table
@@ -26,7 +26,7 @@ def lengths(kind: Kind) -> ErrorUnit:
     return ErrorUnit(kind.length, f"_{kind.moved}", kind)
 
 
-NEWTONS = ErrorUnit(VALVE.force.read, "_n", VALVE)
+METRES, NEWTONS = lengths(VALVE), ErrorUnit(VALVE.force.read, "_n", VALVE)
 
 
 @dataclass(frozen=True, slots=True)
@@ -40,6 +40,9 @@ class Tried:
     typical: float | None
     gain: Gain | None
     rejection_reason: str
+
+
+NOTHING_TRIED = Tried(0, "", None, None, None, None, "")
 
 
 def candidate_table(tried: Sequence[Tried], unit: ErrorUnit, title: str) -> Table:
@@ -74,18 +77,28 @@ def _gain(found: Gain) -> tuple[str, str, str]:
 
 def candidate_columns(tried: Sequence[Tried], unit: ErrorUnit) -> dict[str, list[object]]:
     """Return all candidates of all steps as columns, a row each; None where there is no number."""
+    rows, called = [candidate_json(each, unit) for each in tried], {"name": "effect", "why_not": "rejection_reason"}
+    return {called.get(key, key): [row[key] for row in rows] for key in candidate_json(NOTHING_TRIED, unit)}
+
+
+def candidate_json(each: Tried, unit: ErrorUnit = METRES) -> dict[str, Any]:
+    """Return what JSON says of an effect tried; None where it could not be fitted."""
     return {
-        "step": [each.step for each in tried],
-        "effect": [each.name for each in tried],
-        f"train_rmse{unit.ending}": [each.train for each in tried],
-        f"test_rmse{unit.ending}": [each.test for each in tried],
-        f"test_typical_rmse{unit.ending}": [each.typical for each in tried],
-        "evidence": [each.gain and each.gain.bic for each in tried],
-        "held_out_gain": [each.gain and each.gain.held_out for each in tried],
-        "held_out_evidence": [each.gain and each.gain.held_out_evidence for each in tried],
-        "accepted": [not each.rejection_reason for each in tried],
-        "rejection_reason": [each.rejection_reason for each in tried],
+        "step": each.step,
+        "name": each.name,
+        f"train_rmse{unit.ending}": each.train,
+        f"test_rmse{unit.ending}": each.test,
+        f"test_typical_rmse{unit.ending}": each.typical,
+        **gain_json(each.gain),
+        "accepted": not each.rejection_reason,
+        "why_not": each.rejection_reason,
     }
+
+
+def gain_json(gain: Gain | None) -> dict[str, float | None]:
+    """Return what JSON says of how much better an effect, or several, does than the model before."""
+    names = {"evidence": "bic", "held_out_gain": "held_out", "held_out_evidence": "held_out_evidence"}
+    return {key: None if gain is None else getattr(gain, name) for key, name in names.items()}
 
 
 def draw_race(

@@ -14,6 +14,7 @@ from typing import Generic, TypeVar
 
 from config.results.result import Brief
 from sim.effect import Effect
+from workbench.select.candidate_table import Tried
 from workbench.select.equivalence import algebraic_class
 
 MOST_ADDED = 3
@@ -27,6 +28,11 @@ class Candidate(Brief):
     step: int
     name: str
     rejection_reason: str
+
+    @property
+    def tried(self) -> Tried:
+        """Its row of the table; without errors where it could not be fitted."""
+        raise NotImplementedError
 
     @property
     def accepted(self) -> bool:

@@ -1,7 +1,7 @@
 """What a command writes because an option asks for it: `--out` a folder, `--json` a file.
 
 A path that cannot be written is bad input: one line that names the option, before the work begins (`writable`) where it
-can be known. So is one that the same command reads, whose only copy would be gone (`refuse_own_inputs`).
+can be known. So is one that the same command reads, whose only copy would be gone. `check_outputs` sees to both.
 """
 
 import argparse
@@ -18,8 +18,8 @@ OPTIONS: Mapping[str, str] = {"out": "-o", "json": "--json", "report": "--report
 """By which files are written, by their names among a command's arguments."""
 
 
-def refuse_own_inputs(arguments: argparse.Namespace) -> None:
-    """Refuse an output that is one of the command's inputs, or another of its outputs; of any command.
+def check_outputs(arguments: argparse.Namespace) -> None:
+    """Refuse an output that cannot be written, or is an input or another output of the command; of any command.
 
     Raises:
         InputError: names the option and the file.
@@ -28,6 +28,8 @@ def refuse_own_inputs(arguments: argparse.Namespace) -> None:
     written = {name: said[name] for name in OPTIONS if isinstance(said.get(name), Path)}
     read = [path for name, value in said.items() if name not in written for path in _files(value)]
     for name, path in written.items():
+        if name != "out":  # which may be a folder, yet to be made
+            writable(path, OPTIONS[name])
         if path.is_file() and any(path.samefile(each) for each in read):
             raise InputError(f"{OPTIONS[name]} {path}", "is read by this command as well; allowed is another file")
         alike = next((each for each in written if os.path.realpath(written[each]) == os.path.realpath(path)), name)

@@ -16,7 +16,7 @@ from config.results.block import as_text
 from positioner.cli.parts.breaking_off import end_as_by_ctrl_c
 from positioner.cli.parts.config_argument import add_config, config_files
 from positioner.cli.parts.daemon_address import add_tls
-from positioner.cli.parts.output_files import writable, write_json
+from positioner.cli.parts.output_files import write_json
 
 if TYPE_CHECKING:
     from config.daemon_file import DaemonFile
@@ -64,8 +64,6 @@ def checked(arguments: argparse.Namespace) -> "DaemonFile | None":
     """
     from config.daemon_file import load_daemon
 
-    writable(arguments.json, "--json")
-    writable(arguments.picture, "--picture")
     for option in ("area_m2", "torque_nm_per_pa", "stroke_m"):
         value = getattr(arguments, option, None)
         if value is not None and not 0.0 < value < 1e6:
