@@ -18,7 +18,7 @@ Its files:
     supervision_table, record_tables              tables [safety] and [supervision]; [recorder] and [history]
     alarm_table, alarm_advice                     table [alarms]; what somebody does about an alarm
     hosts, serial_port, tls_table                 where it is, and how it is secured
-    offered, bus_plugins, law_names               what other packages bring by entry points; buses; laws
+    entry_points, bus_plugins, law_names          what other packages bring by entry points; buses; laws
     extras                                        which extra brings what is not installed
     quantities, modbus_map, register_format       what a device measures and obeys; its registers; values in words
     registers, codes, roles                       the supervisory table; every code and its text; who may write

@@ -14,9 +14,9 @@ from typing import TYPE_CHECKING, Annotated, Any, Union
 from pydantic import Tag, model_validator
 
 from config.device import Device
+from config.entry_points import find_offers, origin
 from config.errors import InputError
 from config.loading import choose_by
-from config.offered import find_offers, origin
 
 DEVICES, DRIVERS = "positioner.devices", "positioner.drivers"
 

@@ -12,8 +12,8 @@
 
 from config.bus_plugins import DRIVERS, load_entry
 from config.device import Device
+from config.entry_points import find_offers
 from config.errors import InputError
-from config.offered import find_offers
 from drivers.boundary import Driver
 
 

@@ -6,8 +6,8 @@ Its files:
     server               listens and serves one page, everything of it from this machine
     gate                 who comes in: by the key in the address or by a password; how much at once
     sessions             who came in
-    theme, ink           light and dark; colours of plots
-    telling              errors and sentences, shown
+    theme, plot_colours  light and dark; colours of plots
+    messages             errors and sentences, shown
     page_words           what the commands say, without their options
     units, unit_choice   the units that a person reads in, and where they are chosen
     live_text            a text that changes many times a second

@@ -14,8 +14,8 @@ from weakref import WeakMethod
 
 from nicegui import events, ui
 
+from webpage.messages import tell_error
 from webpage.server import MOST_BYTES
-from webpage.telling import tell_error
 
 Taken = Callable[[events.UploadEventArguments], Awaitable[None]]
 TOLD_WITHIN_S = 3.0

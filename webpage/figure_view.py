@@ -9,7 +9,7 @@ from typing import Any
 
 from nicegui import ui
 
-from webpage.ink import LIGHT, Ink
+from webpage.plot_colours import LIGHT, Ink
 from webpage.theme import Theme
 
 Figure = dict[str, Any]

@@ -4,7 +4,7 @@ from collections.abc import Callable
 
 from nicegui import ui
 
-from webpage.ink import DARK, LIGHT, Ink
+from webpage.plot_colours import DARK, LIGHT, Ink
 
 STYLE = """
 body { font-family: system-ui, -apple-system, "Segoe UI", Roboto, "Helvetica Neue", Arial, sans-serif; }

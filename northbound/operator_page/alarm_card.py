@@ -12,7 +12,7 @@ from northbound.observer.alarms import SeenAlarm, alarms
 from northbound.observer.valve_commands import Confirmation, ValveCommands, refusal_for
 from northbound.observer.valve_view import ValvePicture
 from northbound.operator_page.signed_in import SignedIn
-from webpage.telling import heading
+from webpage.messages import heading
 
 SHELVED_FOR_S: Mapping[str, float] = {"30 min": 1800.0, "2 h": 7200.0, "8 h": 28800.0}
 """A talk, an errand, a shift."""

@@ -20,9 +20,9 @@ from northbound.observer.watched_valves import WatchedValve
 from northbound.operator_page.dialog import Answer, Question
 from northbound.operator_page.moves_ahead import Ahead
 from northbound.operator_page.signed_in import SignedIn
+from webpage.messages import aside, heading
 from webpage.number_field import NumberField
 from webpage.page_words import in_page_words
-from webpage.telling import aside, heading
 from webpage.units import Units
 
 NO_PASSWORDS = "Nobody can sign in: the page was started without --roles FILE."

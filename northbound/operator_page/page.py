@@ -19,8 +19,8 @@ from northbound.operator_page.marks import STYLE, SignOfLife
 from northbound.operator_page.overview import Overview
 from northbound.operator_page.signed_in import SignedIn
 from northbound.operator_page.valve_panel import ValvePanel
+from webpage.messages import aside
 from webpage.server import Listening, serve
-from webpage.telling import aside
 from webpage.theme import Theme
 from webpage.unit_choice import unit_choice
 from webpage.units import Units

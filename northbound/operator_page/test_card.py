@@ -16,8 +16,8 @@ from northbound.observer.valve_view import ValvePicture
 from northbound.observer.watched_valves import Place
 from northbound.operator_page.dialog import Answer, Question
 from northbound.operator_page.signed_in import SignedIn
+from webpage.messages import heading
 from webpage.page_words import in_page_words
-from webpage.telling import heading
 
 Do = Callable[..., Coroutine[Any, Any, None]]
 

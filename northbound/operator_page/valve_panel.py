@@ -21,7 +21,7 @@ from northbound.operator_page.recorded_plot import RecordedPlot
 from northbound.operator_page.signed_in import SignedIn
 from northbound.operator_page.test_card import TestCard
 from northbound.operator_page.trend_plot import WINDOWS_S, TrendPlot
-from webpage.telling import aside, heading
+from webpage.messages import aside, heading
 from webpage.theme import Theme
 from webpage.units import Units
 

@@ -11,9 +11,9 @@ from config.extended_valve import ExtendedValve
 from positioner.estimation.acceptance import Ratios
 from positioner.estimation.estimates import Directions, Estimate, Estimates
 from positioner.estimation.landings.breakaway_distance import BreakawayDistance
+from positioner.estimation.landings.change_point import FINEST
 from positioner.estimation.landings.extended_balance import extended_scatter_m
 from positioner.estimation.landings.landing_detector import Answers, SlideOutcome
-from positioner.estimation.landings.parting import FINEST
 from positioner.estimation.landings.static_identification import StaticIdentification
 
 Covariance = tuple[tuple[float, float, float], tuple[float, float, float], tuple[float, float, float]]

@@ -3,7 +3,7 @@
 One blocking thread owns the driver and runs `cycle`; the supervisory server and the recorder have threads of their
 own. They meet only in immutable snapshots that are replaced whole: the cycle waits for nobody.
 
-    service, ending               starts and ends it; what ends it
+    service, end_signals          starts and ends it; what ends it
     assembled_valves              its valves from their files, or some of them, with all that runs for them
     workers                       processes that share them, where one processor is too little
     cycle, pacing, link           one cycle, when it begins, and the driver with its connection
@@ -22,7 +22,7 @@ own. They meet only in immutable snapshots that are replaced whole: the cycle wa
     recorder, logs                recordings and log lines, written beside the cycle
     recording_compression         closed recordings compressed, in a process of its own
     memory, kept_alone            what is known of a valve, kept over restarts; that one daemon keeps it
-    keeping                       one thread that keeps, for all valves
+    keeping_thread                one thread that keeps, for all valves
     cycle_statistics, health      how punctual it is; how the valve is (NAMUR NE 107)
     alarms                        who has seen what calls for somebody, by ISA-18.2
     history                       what has happened, written beside the cycle

@@ -29,14 +29,14 @@ from positioner.daemon.alarms.alarm_list import AlarmList
 from positioner.daemon.backoff import Doors
 from positioner.daemon.cycle import Cycle, run_in_turn
 from positioner.daemon.cycles_together import SLOT_S, CyclesTogether
-from positioner.daemon.ending import Endings
+from positioner.daemon.end_signals import Endings
 from positioner.daemon.first_look import impossible
 from positioner.daemon.health import Health, HealthKeeper, HealthSettings, StoredHealth, ne107_condition
 from positioner.daemon.health.ne107 import Ne107Condition, classes_of
 from positioner.daemon.history import HistoryKeeper, ValveHistory
 from positioner.daemon.history.decision_events import Happened
 from positioner.daemon.history.health_hours import HealthLook
-from positioner.daemon.keeping import Keeping, Kept
+from positioner.daemon.keeping_thread import Keeping, Kept
 from positioner.daemon.kept_alone import keep_alone
 from positioner.daemon.link import Link, LinkSettings
 from positioner.daemon.local_switch import locks_out

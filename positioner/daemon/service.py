@@ -25,7 +25,7 @@ from fieldbus.modbus.server import RegisterServer
 from fieldbus.modbus.tls import Guard
 from positioner.daemon.assembled_valves import AssembledValves, Share
 from positioner.daemon.cycle_load import cycle_load
-from positioner.daemon.ending import Endings
+from positioner.daemon.end_signals import Endings
 from positioner.daemon.history import HistoryKeeper
 from positioner.daemon.logs import log_event, logging_valve, start_logging
 from positioner.daemon.platform_needs import goes_without

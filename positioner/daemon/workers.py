@@ -32,7 +32,7 @@ from config.errors import InputError
 from fieldbus.modbus.register_answers import RegisterError, Registers, Table
 from fieldbus.modbus.request_counts import RequestCounts
 from positioner.daemon.assembled_valves import AssembledValves, Share
-from positioner.daemon.ending import Endings
+from positioner.daemon.end_signals import Endings
 from positioner.daemon.history import HistoryKeeper
 from positioner.daemon.history.audited_writes import Told
 from positioner.daemon.logs import log_event, start_logging

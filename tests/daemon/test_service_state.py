@@ -10,7 +10,7 @@ from config.quantities import DeviceStatus
 from docs.code_tables import STATES_BEGIN, STATES_END
 from positioner.control.controller_memory import Decision
 from positioner.control.settings import Settings
-from positioner.daemon.ending import Endings
+from positioner.daemon.end_signals import Endings
 from positioner.daemon.service_state import TRANSITIONS, ServiceEvent, service_state, table
 from tests.control.test_controller import LAW, STROKE_M, Bench
 
@@ -91,7 +91,7 @@ def test_every_event_in_every_state_leads_where_the_table_says(state: ServiceSta
 def test_the_end_is_the_end() -> None:
     assert {TRANSITIONS[each].get(ServiceEvent.ENDED, each) for each in ServiceState} == {ServiceState.STOPPED}
     assert TRANSITIONS[ServiceState.STOPPED] == {}
-    assert Endings.__doc__, "tests/cli/test_daemon_process.py ends it, tests/daemon/test_ending.py by every signal"
+    assert Endings.__doc__, "tests/cli/test_daemon_process.py ends it, tests/daemon/test_end_signals.py by every signal"
 
 
 def test_a_fault_whose_cause_lasts_is_not_acknowledged() -> None:

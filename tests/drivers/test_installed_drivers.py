@@ -14,8 +14,8 @@ import pytest
 
 from config.bus_plugins import DEVICES, DRIVERS
 from config.device import Device
+from config.entry_points import find_offers
 from config.errors import InputError
-from config.offered import find_offers
 from drivers import driver_for
 
 GUIDE = Path(__file__).parents[2] / "docs" / "drivers.md"

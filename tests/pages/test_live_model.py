@@ -8,7 +8,7 @@ from config.errors import InputError
 from config.recording import Column, Recording
 from config.valve_file import EffectTable, ValveFile
 from tests.pages.laid_out import hidden
-from webpage.ink import LIGHT
+from webpage.plot_colours import LIGHT
 from webpage.units import Units
 from workbench.compare.comparison import compare
 from workbench.data.record import Record, ready

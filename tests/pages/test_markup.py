@@ -9,8 +9,8 @@ MAY_BE = {
     ("northbound/operator_page/valve_panel.py", "line.label"): "labels of the program's own table",
     ("northbound/operator_page/valve_panel.py", "''"): "nothing",
     ("northbound/operator_page/overview.py", "line"): "labels of the program's own list",
-    ("webpage/telling.py", "f'<ul class=\"said\">{lines}</ul>'"): "each line is escaped before",
-    ("webpage/telling.py", "f'<h2{place}>{escape(text)}</h2>'"): "escaped; the place is the program's own",
+    ("webpage/messages.py", "f'<ul class=\"said\">{lines}</ul>'"): "each line is escaped before",
+    ("webpage/messages.py", "f'<h2{place}>{escape(text)}</h2>'"): "escaped; the place is the program's own",
 }
 
 

@@ -17,7 +17,7 @@ from workbench.blind.hiding import Hidden, hide
 from workbench.data.held_out import join_recordings
 from workbench.diagnosis.diagnosis import diagnose
 from workbench.diagnosis.extension import extend
-from workbench.discriminate.measured_pressure import race_by_pressure
+from workbench.discriminate.rivals_by_pressure import race_by_pressure
 from workbench.fit.fit_result import Fit
 from workbench.fit.fitting import fit
 

@@ -30,8 +30,8 @@ from workbench.discriminate.experiment_design import (
     DesignedExperiment,
     Terms,
 )
-from workbench.discriminate.measured_pressure import race_by_pressure
 from workbench.discriminate.rival_race import ODDS, RivalRace
+from workbench.discriminate.rivals_by_pressure import race_by_pressure
 from workbench.fit.fit_result import Fit
 from workbench.fit.fitted_parameter import parameters_json
 from workbench.select.effect_search import Progress

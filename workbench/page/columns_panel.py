@@ -8,8 +8,8 @@ from nicegui import ui
 
 from config.errors import InputError
 from webpage.figure_view import Figure, FigureView
+from webpage.messages import aside, heading, sentences
 from webpage.number_field import NumberField
-from webpage.telling import aside, heading, sentences
 from webpage.theme import Theme
 from workbench.imports.column_mapping import RANGE_PA, list_units
 from workbench.page.desk import Desk

@@ -7,7 +7,7 @@ from nicegui import background_tasks, events, ui
 
 from webpage.figure_view import Figure, FigureView
 from webpage.live_text import LiveText
-from webpage.telling import aside, errors_told
+from webpage.messages import aside, errors_told
 from webpage.theme import Theme
 from workbench.compare.comparison import Comparison
 from workbench.compare.comparison_sentences import Stretch

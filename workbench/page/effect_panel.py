@@ -10,7 +10,7 @@ from collections.abc import Callable
 from nicegui import ui
 
 from sim.own_effect import EXAMPLE
-from webpage.telling import errors_told, is_looked_at
+from webpage.messages import errors_told, is_looked_at
 from webpage.theme import Theme
 from workbench.page.background import Failed, Progressed
 from workbench.page.desk import Desk

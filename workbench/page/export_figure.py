@@ -1,7 +1,7 @@
 """A recording before it is taken: position and command over time, small, as the chosen columns and units make it."""
 
 from config.recording import Column, Recording
-from webpage.ink import Ink
+from webpage.plot_colours import Ink
 from webpage.units import Unit, Units
 from workbench.report.charts import Figure, axis, layout
 from workbench.report.plot_series import extremes, round_values, running_s

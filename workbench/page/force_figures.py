@@ -10,7 +10,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from config.recording import Column
-from webpage.ink import Ink
+from webpage.plot_colours import Ink
 from webpage.units import Unit
 from workbench.compare.friction_balance import Forces
 from workbench.page.time_figure import Window

@@ -6,7 +6,7 @@ from pathlib import Path
 from nicegui import ui
 
 from webpage.figure_view import Figure, FigureView
-from webpage.telling import aside, errors_told, heading
+from webpage.messages import aside, errors_told, heading
 from webpage.theme import Theme
 from workbench.blind.sealing import reveal
 from workbench.diagnosis.extension_journal import ExtensionStep

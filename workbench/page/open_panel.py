@@ -12,8 +12,8 @@ from config.errors import InputError
 from config.loading import SHIPPED
 from config.writing import write_valve
 from webpage.drop_box import drop_box
+from webpage.messages import aside, errors_told, heading, sentences
 from webpage.number_field import NumberField
-from webpage.telling import aside, errors_told, heading, sentences
 from webpage.theme import Theme
 from workbench.page.columns_panel import ColumnsPanel
 from workbench.page.desk import Desk, name_valve

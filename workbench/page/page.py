@@ -5,8 +5,8 @@ from pathlib import Path
 
 from nicegui import app, ui
 
+from webpage.messages import aside, errors_told, heading, look_at
 from webpage.server import Listening, serve
-from webpage.telling import aside, errors_told, heading, look_at
 from webpage.theme import Theme
 from webpage.unit_choice import unit_choice
 from workbench.page.compare_panel import ComparePanel

@@ -8,9 +8,9 @@ from nicegui import ui
 from config.errors import InputError
 from sim.effect import tried_effects
 from webpage.figure_view import Figure, FigureView
+from webpage.messages import aside, errors_told, heading, is_looked_at, look_at, tell_error
 from webpage.number_field import NumberField
 from webpage.page_words import in_page_words
-from webpage.telling import aside, errors_told, heading, is_looked_at, look_at, tell_error
 from webpage.theme import Theme
 from workbench.diagnosis.diagnosis import Diagnosis
 from workbench.discover.discovery import Discovery

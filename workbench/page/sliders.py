@@ -7,8 +7,8 @@ from nicegui import events, ui
 from nicegui.elements.mixins.value_element import ValueElement
 
 from webpage.live_text import LiveText
+from webpage.messages import errors_told, heading
 from webpage.number_field import NumberField
-from webpage.telling import errors_told, heading
 from webpage.units import Units
 from workbench.fit.fitted_parameter import Fitted
 from workbench.model.parameters import Parameter

@@ -12,7 +12,7 @@ import numpy as np
 
 from config.drive import VALVE
 from config.recording import Column
-from webpage.ink import Ink
+from webpage.plot_colours import Ink
 from webpage.units import Unit, Units
 from workbench.compare.comparison_sentences import Stretch, slip_sentences
 from workbench.compare.slip_matching import SlipEvents

@@ -14,9 +14,9 @@ from importlib.metadata import EntryPoint
 from importlib.util import find_spec
 from typing import Any
 
+from config.entry_points import find_offers, origin
 from config.errors import InputError
 from config.extras import EXTRAS
-from config.offered import find_offers, origin
 
 GROUP = "positioner.commands"
 COMMANDS = {

@@ -32,7 +32,7 @@ from positioner.daemon.snapshot import Snapshot
 log = logging.getLogger(__name__)
 
 WRITE_EVERY_CHECKS = 60
-"""Of a second each (`positioner.daemon.keeping`)."""
+"""Of a second each (`positioner.daemon.keeping_thread`)."""
 
 
 def health_path(folder: Path, valve: str) -> Path:

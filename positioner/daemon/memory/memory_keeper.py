@@ -22,7 +22,7 @@ from positioner.daemon.memory.memory_file import Kept, read_memory, set_aside, w
 log = logging.getLogger(__name__)
 
 WRITE_EVERY_CHECKS = 60
-"""Of a second each (`positioner.daemon.keeping`)."""
+"""Of a second each (`positioner.daemon.keeping_thread`)."""
 
 
 def memory_path(folder: Path, valve: str) -> Path:

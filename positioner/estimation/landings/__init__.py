@@ -13,7 +13,7 @@ Neither mass nor viscous friction, lag nor sampling stands in it, and a preload 
     extended_balance                  is an extended valve the one that is there
     swing                             how far past its balance a stem swings and sticks there
     packing_compliance                how far the packing of a stuck stem gives way
-    parting                           the instant that parts landings best
+    change_point                      the instant that parts landings best
     landing_shift                     was the sensor shifted while landings were gathered
     static_identification             all of it, sample by sample, and what it says of other estimates
     recording_landings                the same from a whole recording

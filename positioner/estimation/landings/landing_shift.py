@@ -3,7 +3,7 @@
     p_j = κ x_j + φ_up + δ d_j,   p_j = κ x_j - φ_down + δ d_j       d_j = 0 before an instant, 1 after it
 
 A position sensor that jumps shifts all that lands later by the same way, in either direction. The instant that parts
-them best (`parting.py`) is judged by t = |δ| / std δ.
+them best (`change_point.py`) is judged by t = |δ| / std δ.
 
 A spring that hardens, or friction that grows over the travel, looks like a shift to a straight law, for S3 goes over
 the travel in time. So where there are landings enough, a law bent by x^2 and s x must be parted by the shift as well.
@@ -17,8 +17,8 @@ from collections.abc import Iterable
 import numpy as np
 
 from positioner.estimation.array import Array
+from positioner.estimation.landings.change_point import best_parting
 from positioner.estimation.landings.landing_detector import SlideOutcome
-from positioner.estimation.landings.parting import best_parting
 from positioner.estimation.landings.static_law import DEVIATIONS, LEAST_SHIFT, columns, t_of_three_deviations
 
 SURE = 2.0

@@ -33,8 +33,8 @@ import numpy as np
 from config.extended_valve import ExtendedValve
 from positioner.estimation.acceptance import Ratios
 from positioner.estimation.array import Array
+from positioner.estimation.landings.change_point import FINEST
 from positioner.estimation.landings.landing_detector import SlideOutcome
-from positioner.estimation.landings.parting import FINEST
 
 WIDTH = 0.04
 """h, of the stroke."""

@@ -35,9 +35,9 @@ from config.codes import Refusal
 from positioner.estimation.acceptance import Ratios
 from positioner.estimation.array import Array
 from positioner.estimation.estimates import Estimate, no_estimate
+from positioner.estimation.landings.change_point import FINEST
 from positioner.estimation.landings.landing_detector import SlideOutcome
 from positioner.estimation.landings.local_balance import LocalBalance
-from positioner.estimation.landings.parting import FINEST
 from positioner.estimation.landings.swing import balanced, swing_of
 
 FEWEST_LANDINGS, FEWEST_EACH = 5, 2

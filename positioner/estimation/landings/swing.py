@@ -15,8 +15,8 @@ Whether there is such a column: ρ > 6 of its deviations, and the residuals fall
 some 1/omega) leaves no swing.
 
 A sensor that jumped looks like a swing where the ways before it were long, or where it came back and the jump counts as
-a way. So there is none if without some one landing there is none, nor if an instant parts the landings (`parting.py`)
-and leaves less than two thirds of the residuals.
+a way. So there is none if without some one landing there is none, nor if an instant parts the landings
+(`change_point.py`) and leaves less than two thirds of the residuals.
 """
 
 from collections.abc import Sequence
@@ -25,8 +25,8 @@ from math import inf, sqrt
 import numpy as np
 
 from positioner.estimation.array import Array
+from positioner.estimation.landings.change_point import FINEST, best_parting
 from positioner.estimation.landings.landing_detector import SlideOutcome
-from positioner.estimation.landings.parting import FINEST, best_parting
 
 FEWEST_SWING_LANDINGS = 8
 """Landings."""

@@ -5,7 +5,7 @@ import sys
 
 TRY = """
 import os, signal, threading
-from positioner.daemon.ending import ENDING, OF_TERMINALS, Endings
+from positioner.daemon.end_signals import ENDING, OF_TERMINALS, Endings
 
 signal.signal(signal.SIGUSR2, signal.SIG_IGN)
 endings = Endings()

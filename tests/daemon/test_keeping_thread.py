@@ -5,8 +5,8 @@ from threading import Event
 
 import pytest
 
-from positioner.daemon import keeping
-from positioner.daemon.keeping import Keeping, Kept
+from positioner.daemon import keeping_thread
+from positioner.daemon.keeping_thread import Keeping, Kept
 
 WITHIN_S = 30.0
 
@@ -24,7 +24,7 @@ class Looked:
 
 
 def test_all_are_looked_at_in_turn_by_one_thread(monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setattr(keeping, "EVERY_S", 1e-3)
+    monkeypatch.setattr(keeping_thread, "EVERY_S", 1e-3)
     order: list[str] = []
     often, before = Event(), threading.active_count()
     one = Keeping([Kept(Looked(name, order, often), name) for name in "abc"])
@@ -37,7 +37,7 @@ def test_all_are_looked_at_in_turn_by_one_thread(monkeypatch: pytest.MonkeyPatch
 
 
 def test_it_ends_at_once_however_long_it_waits(monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setattr(keeping, "EVERY_S", 1e6)
+    monkeypatch.setattr(keeping_thread, "EVERY_S", 1e6)
     one = Keeping([Kept(Looked("a", [], Event()), "a")])
     one.start()
     one.stop()
@@ -45,8 +45,8 @@ def test_it_ends_at_once_however_long_it_waits(monkeypatch: pytest.MonkeyPatch) 
 
 
 def test_what_a_look_raises_is_the_death_of_the_thread(monkeypatch: pytest.MonkeyPatch) -> None:
-    """As `positioner.daemon.ending` takes it: the daemon ends."""
-    monkeypatch.setattr(keeping, "EVERY_S", 1e-3)
+    """As `positioner.daemon.end_signals` takes it: the daemon ends."""
+    monkeypatch.setattr(keeping_thread, "EVERY_S", 1e-3)
     died: list[str] = []
     told = Event()
 
