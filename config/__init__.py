@@ -20,7 +20,8 @@ Its files:
     hosts, serial_port, tls_table                 where it is, and how it is secured
     entry_points, bus_plugins, law_names          what other packages bring by entry points; buses; laws
     extras                                        which extra brings what is not installed
-    quantities, modbus_map, register_format       what a device measures and obeys; its registers; values in words
+    quantities, quantity_map, modbus_map          what a device measures and obeys; where it keeps it; in registers
+    register_format                               values in words
     registers, codes, roles                       the supervisory table; every code and its text; who may write
     passwords, role_passwords                     passwords as they are kept; the file with those of the roles
     recording, plausibility                       the recording format; what is odd about a recording

@@ -15,7 +15,8 @@ from pydantic import AfterValidator, Field, model_validator
 from config.device import Device
 from config.errors import InputError
 from config.loading import SHIPPED, NearFile, NonNegative, Schema
-from config.quantities import QUANTITIES, WRITABLE, ActionName
+from config.quantities import QUANTITIES, ActionName
+from config.quantity_map import QuantityMap, Scaled
 
 FIRST_OBJECT = 0x2000
 """Manufacturer-specific objects begin here."""
@@ -25,62 +26,27 @@ SYNC_IDS = (range(0x80, 0x101), range(0x181, 0x581), range(0x680, 0x6E0))
 SHIPPED_EDS = SHIPPED / "profiles" / "positioner.eds"
 
 
-class Entry(Schema):
-    """Where a quantity lies in the object dictionary: value = scale * raw + offset, in the quantity's unit."""
+class Entry(Scaled):
+    """Where a quantity lies in the object dictionary."""
 
     index: Annotated[int, Field(ge=0x1000, le=0xFFFF)]
     subindex: Annotated[int, Field(ge=0, le=254)] = 0
-    scale: float = 1.0
-    offset: float = 0.0
-
-    @model_validator(mode="after")
-    def _has_a_scale(self) -> Self:
-        if self.scale == 0:
-            raise ValueError("scale must not be 0")
-        return self
-
-    def value(self, raw: float) -> float:
-        """Return the value of a raw number."""
-        return self.scale * raw + self.offset
-
-    def raw(self, value: float) -> float:
-        """Return the raw number of a value, not rounded.
-
-        Raises:
-            ValueError: not a finite number.
-        """
-        if not math.isfinite(value):
-            raise ValueError(f"{value} is not a finite number")
-        return (value - self.offset) / self.scale
 
 
-class ObjectMap(Schema):
-    """The quantities a device has, by object. Only position and command are indispensable.
+class ObjectMap(QuantityMap[Entry]):
+    """The quantities a device has, by object.
 
     A device without control and status word is taken for ACTIVE as long as it is OPERATIONAL.
     """
 
-    position_m: Entry
-    command_pa: Entry
-    pressure_pa: Entry | None = None
-    sample_counter: Entry | None = None
-    device_time_us: Entry | None = None
-    status: Entry | None = None
-    communication_timeout_s: Entry | None = None
-    communication_action: Entry | None = None
     control_word: Entry | None = None
     status_word: Entry | None = None
 
     @property
-    def entries(self) -> dict[str, Entry]:
-        """The quantities the device has, by name, in the order of `QUANTITIES`."""
-        return {each.name: entry for each in QUANTITIES if (entry := getattr(self, each.name)) is not None}
-
-    @property
     def sampled(self) -> dict[str, Entry]:
         """What the device sends of one sample, by name."""
-        sampled = {name: entry for name, entry in self.entries.items() if name not in WRITABLE}
-        return sampled if self.status_word is None else {**sampled, "status_word": self.status_word}
+        status = {} if self.status_word is None else {"status_word": self.status_word}
+        return super().sampled | status
 
     @property
     def commanded(self) -> dict[str, Entry]:

@@ -3,7 +3,6 @@
 `SIMULATED_MAP` is where the simulated slave keeps them; the map of a real device is written in the same words.
 """
 
-import math
 from collections.abc import Iterable
 from itertools import pairwise, product
 from typing import Annotated, Any, Literal, Self, get_args
@@ -12,6 +11,7 @@ from pydantic import Field, model_validator
 
 from config.loading import Schema
 from config.quantities import QUANTITIES, WRITABLE, ActionName, CommunicationAction, DeviceStatus
+from config.quantity_map import QuantityMap, Scaled
 from config.register_format import Format, Order, WireType
 
 MOST_REGISTERS = 125
@@ -21,21 +21,17 @@ MOST_REGISTERS = 125
 ORDERS: tuple[Order, ...] = get_args(Order)
 
 
-class Place(Schema):
-    """Where a quantity lies in a device's registers: value = scale * raw + offset, in the quantity's unit."""
+class Place(Scaled):
+    """Where a quantity lies in a device's registers."""
 
     table: Literal["holding", "input"] = "holding"
     address: Annotated[int, Field(ge=0, le=65535)]
     type: WireType = "float32"
     word_order: Order = "big"
     byte_order: Order = "big"
-    scale: float = 1.0
-    offset: float = 0.0
 
     @model_validator(mode="after")
-    def _has_a_scale_and_room(self) -> Self:
-        if self.scale == 0:
-            raise ValueError("scale must not be 0")
+    def _has_room(self) -> Self:
         if self.end > 65536:
             raise ValueError(f"{self.type} at {self.address} reaches past register 65535")
         return self
@@ -55,24 +51,13 @@ class Place(Schema):
         """Whether it holds any number, not whole ones alone."""
         return self.type in ("float32", "float64")
 
-    @property
-    def is_plain(self) -> bool:
-        """Whether the raw value is the value."""
-        return self.scale == 1 and self.offset == 0
-
-    def value(self, raw: float) -> float:
-        """Return the value of a raw number."""
-        return raw if self.is_plain else self.scale * raw + self.offset
-
     def raw(self, value: float) -> float:
         """Return the raw number nearest to a value; a whole one where the type is.
 
         Raises:
             ValueError: not a finite number.
         """
-        if not math.isfinite(value):
-            raise ValueError(f"{value} is not a finite number")
-        raw = value if self.is_plain else (value - self.offset) / self.scale
+        raw = super().raw(value)
         return raw if self.is_float else round(raw)
 
     def in_other_orders(self, value: float) -> dict[str, float]:
@@ -147,21 +132,13 @@ Run = dict[str, Place]
 """Quantities that one read brings, by name."""
 
 
-class ModbusMap(Schema):
-    """The quantities a device has, by place. Only position and command are indispensable.
+class ModbusMap(QuantityMap[Place]):
+    """The quantities a device has, by their registers.
 
     What the device says of one sample (position, pressure, counter, time, status) is read in one transaction where it
     lies within 125 registers of one table; else in several, and then need not be of one sample.
     """
 
-    position_m: Place
-    command_pa: Place
-    pressure_pa: Place | None = None
-    sample_counter: Place | None = None
-    device_time_us: Place | None = None
-    status: Place | None = None
-    communication_timeout_s: Place | None = None
-    communication_action: Place | None = None
     sample_counter_bits: Annotated[int, Field(ge=2, le=64)] | None = None
     """Of a counter that wraps before its registers are full; all of them where nobody says."""
     status_bits: StatusBits | None = None
@@ -174,16 +151,6 @@ class ModbusMap(Schema):
         """How far the sample counter counts."""
         bits = 32 if self.sample_counter is None else 16 * self.sample_counter.format.words
         return 1 << (self.sample_counter_bits or bits)
-
-    @property
-    def places(self) -> dict[str, Place]:
-        """The quantities the device has, by name, in the order of `QUANTITIES`."""
-        return {each.name: place for each in QUANTITIES if (place := getattr(self, each.name)) is not None}
-
-    @property
-    def sampled(self) -> dict[str, Place]:
-        """The quantities of one sample, by name."""
-        return {name: place for name, place in self.places.items() if name not in WRITABLE}
 
     @property
     def runs(self) -> list[Run]:

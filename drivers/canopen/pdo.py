@@ -67,7 +67,7 @@ class Pdo:
         self.mapping = [each.index << 16 | each.subindex << 8 | len(each) for each in objects]
         letters = (f"{each}x" if isinstance(each, int) else _letter(variables[each[0]]) for each in entries)
         self.layout = struct.Struct("<" + "".join(letters))
-        self._is_plain = all(entry.scale == 1 and entry.offset == 0 for entry in self.entries)
+        self._is_plain = all(entry.is_plain for entry in self.entries)
         self._is_real = [each.data_type in REALS for each in objects]
 
     def values(self, data: bytes | bytearray) -> dict[str, float]:

@@ -68,7 +68,7 @@ def device_sheet(config: CanopenDevice) -> ObjectDictionary:
         InputError: the data sheet cannot be read, or has not what the map names.
     """
     sheet = read_eds(config.eds, config.node)
-    for name, entry in config.map.entries.items():
+    for name, entry in config.map.places.items():
         sheet_variable(sheet, config, name, entry)
     return sheet
 

@@ -176,7 +176,7 @@ def _bytes(name: str) -> int:
 
 def _quantities() -> dict[int, Object]:
     """Return the quantities as objects; only the command is worth a PDO among those that are set."""
-    entries = SIMULATED_OBJECTS.entries
+    entries = SIMULATED_OBJECTS.places
     return {
         entries[each.name].index: Variable(
             each.name,

@@ -276,7 +276,7 @@ class CanopenNode:
         def of(name: str) -> Read:
             return lambda: float(getattr(device, name)) if name.endswith(("_m", "_pa", "_s")) else getattr(device, name)
 
-        return {entry.index: of(name) for name, entry in SIMULATED_OBJECTS.entries.items()} | {
+        return {entry.index: of(name) for name, entry in SIMULATED_OBJECTS.places.items()} | {
             ERROR_REGISTER: self._error_register,
             CONTROL_WORD: lambda: self.machine.control_word,
             STATUS_WORD: lambda: self.machine.word,

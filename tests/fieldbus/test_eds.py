@@ -28,9 +28,9 @@ def test_the_shipped_file_is_the_one_the_table_gives() -> None:
 
 def test_every_quantity_of_the_modbus_map_is_an_object_of_the_same_type_and_access() -> None:
     sheet = read_eds(SHIPPED_EDS, NODE)
-    assert list(SIMULATED_OBJECTS.entries) == list(SIMULATED_MAP.places) == [each.name for each in QUANTITIES]
+    assert list(SIMULATED_OBJECTS.places) == list(SIMULATED_MAP.places) == [each.name for each in QUANTITIES]
     for quantity in QUANTITIES:
-        entry = SIMULATED_OBJECTS.entries[quantity.name]
+        entry = SIMULATED_OBJECTS.places[quantity.name]
         found = sheet.get_variable(entry.index, entry.subindex)
         assert found is not None
         assert (found.name, found.data_type) == (quantity.name, DATA_TYPE[quantity.type])
