@@ -6,8 +6,9 @@
 The device is that of `tests/other_device.py`: a preload, no time stamp, no counter, no function 23; a position of 12
 bits, pressure and command in whole mbar, or as fine as 16 bits are (`--bits 16 --register-pa 10`). The daemon is a
 process; the DCS writes eta = 0, 0, 0 and nothing about the valve, then steps of 0.5 to 10 % of the stroke. A move
-has ended when the command has stood for 60 cycles; its time is until the stem is within 0.1 % of where it ends, for
-good. Errors are of the true stem, % of stroke; a step has landed within 0.1 % or a quantum, whichever is more.
+has ended when the daemon has taken the reference, and the command has stood for 60 of its cycles; so a busy machine
+makes moves longer, and ends none. Its time is until the stem is within 0.1 % of where it ends, for good. Errors are of
+the true stem, % of stroke; a step has landed within 0.1 % or a quantum, whichever is more.
 All in real time: 200 steps take five minutes at 20 ms, and a quarter of an hour at 100 ms.
 """
 
@@ -50,7 +51,7 @@ def report(period_s: float, steps: int, parameters: Parameters, registers: Regis
                 value, std = found[f"{name}_e"], found[f"{name}_std"]
                 off = 100 * (value / true - 1)
                 yield f"    {name:12} {value:12.6g}  true {true:12.6g}  {off:+6.2f} %  deviation {std:8.3g}"
-            moves = [moved(device, dcs, each, period_s) for each in references(steps, seed)]
+            moves = [moved(device, dcs, each) for each in references(steps, seed)]
     yield f"    {steps} steps: {said(moves, max(LANDED, 1 / registers.counts))}"
 
 

@@ -16,9 +16,11 @@ from tests.other_device import OtherDevice
 LAW = ("static_slope", "static_up", "static_down")
 """Registers of the static law, in the order of `Parameters.static_law`."""
 ENDED_CYCLES, ENDED_WITHIN_CYCLES = 60, 3000
-"""A move has ended when the command has stood for so many cycles; it is given up after so many."""
+"""A move has ended when the command has stood for so many cycles of the daemon; it is given up after so many."""
 ARRIVED = 1e-3
 """Of the stroke: a stem as near to where it ends has arrived."""
+TAKEN = 1e-6
+"""Of the stroke: registers round the reference."""
 POLL_S = 0.02
 DCS_WITHIN_S = 20.0
 
@@ -60,16 +62,31 @@ def identified_at(device: OtherDevice, period_s: float, within_s: float) -> Iter
             yield dcs
 
 
-def moved(device: OtherDevice, dcs: Dcs, reference: float, period_s: float) -> Move:
-    """Write a reference, p.u., and wait for the end of the move."""
-    began_s = last_s = time.monotonic()
-    dcs.set("reference", reference)
-    command, slides = device.command, 0
+def moved(device: OtherDevice, dcs: Dcs, reference: float) -> Move:
+    """Write a reference, p.u., and wait for the end of the move; the daemon's own cycles count, not the clock's time.
+
+    Raises:
+        RuntimeError: the daemon has not taken the reference.
+    """
+    began_s, began = time.monotonic(), _await_taken(dcs, reference)
+    command, slides, last, cycles = device.command, 0, began, began
     path = []
-    while (now_s := time.monotonic()) < min(began_s + ENDED_WITHIN_CYCLES * period_s, last_s + ENDED_CYCLES * period_s):
+    while cycles - began < ENDED_WITHIN_CYCLES and cycles - last < ENDED_CYCLES:
+        cycles = int(dcs.get("cycles"))
         if device.command != command:
-            command, slides, last_s = device.command, slides + 1, now_s
-        path.append((now_s - began_s, device.stem.position_m / device.stem.parameters.stroke_m))
+            command, slides, last = device.command, slides + 1, cycles
+        path.append((time.monotonic() - began_s, device.stem.position_m / device.stem.parameters.stroke_m))
         time.sleep(POLL_S)
     _, end = path[-1]
     return Move(end - reference, slides, max((at_s for at_s, at in path if abs(at - end) > ARRIVED), default=0.0))
+
+
+def _await_taken(dcs: Dcs, reference: float) -> int:
+    """Write a reference, p.u., and return the number of cycles run when the law follows it."""
+    written = int(dcs.get("cycles"))
+    dcs.set("reference", reference)
+    while abs(dcs.get("reference_in_force") - reference) > TAKEN:
+        if int(dcs.get("cycles")) - written > ENDED_CYCLES:
+            raise RuntimeError(f"the reference {reference} was not taken in {ENDED_CYCLES} cycles")
+        time.sleep(POLL_S)
+    return int(dcs.get("cycles"))

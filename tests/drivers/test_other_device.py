@@ -21,4 +21,4 @@ def test_it_is_identified_with_nothing_typed_in_and_its_steps_land() -> None:
         for name, true in zip(LAW, valve.static_law, strict=True):
             assert dcs.get(f"{name}_e") == pytest.approx(true, rel=NEAR), name
         for reference in (0.52, 0.515, 0.55):
-            assert abs(moved(device, dcs, reference, PERIOD_S).error) < LANDED
+            assert abs(moved(device, dcs, reference).error) < LANDED
