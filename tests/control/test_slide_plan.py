@@ -59,6 +59,10 @@ def test_each_bound_bars_an_excursion() -> None:
     assert PLAN.barred(up) is InhibitReason.NOTHING
     near = replace(PLAN, bounds=replace(SETTINGS, excursion_limit_m=1e-3))
     assert near.barred(up) is InhibitReason.EXCURSION_BEYOND_LIMIT
+    far = replace(PLAN, from_m=PLAN.target_m + 5e-3, bounds=replace(SETTINGS, excursion_limit_m=8e-3))
+    around = next(each for each in far.excursions(begun=False) if each.by_m > far.from_m)
+    assert around.by_m - far.target_m > 8e-3 > around.by_m - far.from_m
+    assert far.barred(around) is InhibitReason.NOTHING, "what counts is how far beyond the move it goes"
     beyond = replace(PLAN, target_m=0.0985)
     assert {beyond.barred(each) for each in beyond.excursions(begun=False)} >= {InhibitReason.EXCURSION_BEYOND_LIMIT}
     low = replace(PLAN, target_m=(FRICTION_PA - 1e3) / SLOPE_PA_PER_M, from_m=0.027, anchor=None)

@@ -34,7 +34,7 @@ from positioner.estimation.landings.landing_detector import VISIBLE
 
 
 class Excursion(NamedTuple):
-    """The direction of its first slide, by which place it goes, and how far beyond the way between, m."""
+    """The direction of its first slide, by which place it goes, and how far beyond the move, m."""
 
     direction: int
     by_m: float
@@ -107,24 +107,25 @@ class Plan:
         return command_pa if holds and self.bounds.allows(command_pa) else None
 
     def excursions(self, *, begun: bool) -> tuple[Excursion, Excursion]:
-        """Return the excursions by either side, first the one that leaves the way between stem and target by less.
+        """Return the excursions by either side, first the one that goes less far beyond the move.
 
-        What a slide of the move has left beside its target is off that way already (begun), and while references keep
-        coming there is none: then it is the one that leaves the target by less.
+        The move is the way between stem and target. A stem that a slide of the move has brought there is off that way
+        already (begun), and while references keep coming there is none: then the target alone counts.
         """
         error_m = self.target_m - self.from_m
         s, way_m = (1 if error_m > 0 else -1), abs(error_m)
         on_m = max(self.back_m(-s), self.way_m(s) - way_m)
         round_m = max(self.back_m(s), self.way_m(-s) + way_m)
+        around_m = round_m if begun else round_m - way_m
         by_its_side = Excursion(direction=s, by_m=self.target_m + s * on_m, beyond_m=on_m)
-        by_the_other = Excursion(direction=-s, by_m=self.target_m - s * round_m, beyond_m=round_m - way_m)
-        leaves_m = round_m if begun else self.bounds.thresholds.other_side * by_the_other.beyond_m
-        return (by_its_side, by_the_other) if on_m <= leaves_m else (by_the_other, by_its_side)
+        by_the_other = Excursion(direction=-s, by_m=self.target_m - s * round_m, beyond_m=around_m)
+        longer = self.bounds.thresholds.other_side
+        return (by_its_side, by_the_other) if on_m <= longer * around_m else (by_the_other, by_its_side)
 
     def barred(self, each: Excursion) -> InhibitReason:
         """Return which bound of the site bars an excursion; `NOTHING`: none does."""
         low_m, high_m = self.balance.stops_m
-        if abs(each.by_m - self.target_m) > self.bounds.excursion_limit_m or not low_m <= each.by_m <= high_m:
+        if each.beyond_m > self.bounds.excursion_limit_m or not low_m <= each.by_m <= high_m:
             return InhibitReason.EXCURSION_BEYOND_LIMIT
         both_pa = (
             self.balance.pressure_pa(each.by_m, each.direction),

@@ -254,7 +254,7 @@ def two_slides(memory: SlideMemory, now: Now) -> SlideMemory:
         return _stuck_or_barred(memory, now, InhibitReason.TRIM_ENDED)
     from_m = _standing_m(memory, now)
     plan, spent = now.plan(memory, from_m), memory.excursions
-    begun, reasons = memory.move.begun or bool(memory.course and memory.course.changes_m), []
+    begun, reasons = memory.move.landed > 0 or bool(memory.course and memory.course.changes_m), []
     for each in plan.excursions(begun=begun):
         spent_m = (spent.spent_at_m(seen.now_s, bounds) if spent else 0.0) + 2 * each.beyond_m
         broke = 0.0 < day_m(bounds) < spent_m and not _left_away(memory, now)
