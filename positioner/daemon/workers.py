@@ -195,6 +195,7 @@ class Worker:
             if self._serves and self._process is not None and now_s - self._turned_s > stands_s:
                 log_event(log, logging.ERROR, "a worker's cycles stand", valves=self._names, pid=self._process.pid)
                 self._process.kill()
+                self._turned_s = now_s  # its end is heard of with a later look, and said once
         elif now_s >= self._again_s:
             try:
                 self.start()
