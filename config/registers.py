@@ -6,11 +6,12 @@ as on the wire; many tools print them from 1.
 """
 
 import math
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from itertools import chain
 from typing import Literal
 
 from config.codes import (
+    Code,
     EndTrend,
     EventKind,
     ExperimentState,
@@ -20,6 +21,7 @@ from config.codes import (
     Ne107Cause,
     Ne107Status,
     Quality,
+    Refusal,
     Restored,
     Sampling,
     ServiceState,
@@ -39,6 +41,9 @@ MOST_EXPERIMENT_POINTS = 200
 """Of an experiment."""
 
 
+Codes = type[Code]
+
+
 @dataclass(frozen=True, slots=True)
 class Register:
     """One value of the table: `minimum` and `maximum` bound what may be written."""
@@ -53,6 +58,8 @@ class Register:
     maximum: float | None = None
     writer: Role = Role.ENGINEER
     """Who may write it on a secured connection."""
+    codes: Codes | None = None
+    """What its numbers say."""
 
     @property
     def format(self) -> Format:
@@ -92,6 +99,11 @@ def _writable(
     return Register(name, address, type_, unit, text, "rw", low, high, writer)
 
 
+def _coded(name: str, address: int, codes: Codes, text: str = "") -> Register:
+    """Return a register that serves a code; its text ends with what each number says."""
+    return Register(name, address, "uint16", "1", f"{text}: {texts(codes)}" if text else texts(codes), codes=codes)
+
+
 def _operable(name: str, address: int, type_: WireType, unit: str, low: float, high: float, text: str) -> Register:
     """Return a register that operators write, too."""
     return _writable(name, address, type_, unit, low, high, text, Role.OPERATOR)
@@ -104,7 +116,7 @@ COMMANDS = (
         "reference", 0, "float32", "p.u.", 0.0, 1.0, "opening asked for, or the signal that [travel] makes one of"
     ),
     _operable("reference_scaled", 2, "uint16", "1e-4 p.u.", 0, 10000, "the same as a whole number"),
-    _writable("mode", 3, "uint16", "1", 0, 2, f"{texts(Mode)}; falls to hold on a fault"),
+    replace(_writable("mode", 3, "uint16", "1", 0, 2, f"{texts(Mode)}; falls to hold on a fault"), codes=Mode),
     _writable("eta_1", 4, "uint16", "1", 0, 1, "0 switches the excitation on (state S3); the DCS ends it: 1"),
     _writable("eta_2", 5, "uint16", "1", 0, 1, "0 switches the parameter identifier on"),
     _writable("eta_3", 6, "uint16", "1", 0, 1, "0 switches the friction estimator on"),
@@ -117,10 +129,10 @@ COMMANDS = (
 )
 
 STATUS = (
-    Register("state", 100, "uint16", "1", texts(State)),
-    Register("fault", 101, "uint16", "1", texts(Fault)),
-    Register("quality", 102, "uint16", "1", f"of the last measurement: {texts(Quality)}"),
-    Register("why", 103, "uint16", "1", f"why not as asked: {texts(InhibitReason)}"),
+    _coded("state", 100, State),
+    _coded("fault", 101, Fault),
+    _coded("quality", 102, Quality, "of the last measurement"),
+    _coded("why", 103, InhibitReason, "why not as asked"),
     Register("position", 104, "float32", "p.u.", "opening, from the closed end"),
     Register("position_scaled", 106, "int16", "1e-4 p.u.", "the same as a whole number"),
     Register("device_status", 107, "uint16", "1", f"the device's own status word, bits: {list_bits(DeviceStatus)}"),
@@ -131,9 +143,9 @@ STATUS = (
     Register("sample_age", 116, "float32", "s", "time since the last good measurement"),
     Register("reference_in_force", 118, "float32", "p.u.", "what the law follows; outside automatic, the stem"),
     Register("position_deg", 134, "float32", "deg", "the same of a valve that turns; NaN: it has a stem"),
-    Register("restored", 122, "uint16", "1", f"what was known before the daemon was started: {texts(Restored)}"),
+    _coded("restored", 122, Restored, "what was known before the daemon was started"),
     Register("emergency", 124, "uint16", "1", "CANopen: error code of the device's last EMCY, 0 when it is over"),
-    Register("service", 125, "uint16", "1", f"what the service does: {texts(ServiceState)}"),
+    _coded("service", 125, ServiceState, "what the service does"),
     Register("locked_out", 126, "uint16", "1", "1: the local switch locks out all writes but the heartbeat"),
     Register(
         "reference_opening", 128, "float32", "p.u.", "opening that the reference asks for: split range, characteristic"
@@ -168,7 +180,7 @@ def _estimate_registers_of(name: str, base: int, unit: str, text: str) -> tuple[
         Register(f"{name}_e", base, "float32", unit, text + where),
         Register(f"{name}_std", base + 2, "float32", unit, f"standard deviation of {name}_e{where}"),
         Register(f"{name}_valid", base + 4, "uint16", "1", "1 when the estimate may be used"),
-        Register(f"{name}_reason", base + 5, "uint16", "1", "0 valid, else why not (positioner map --reasons)"),
+        replace(_coded(f"{name}_reason", base + 5, Refusal), text="0 valid, else why not (positioner map --reasons)"),
     )
 
 
@@ -190,7 +202,7 @@ ESTIMATES = (
     Register("k_over_c_applied", 246, "float32", "Pa", "k/c as the law uses it; NaN: none yet"),
     Register("identifications", 248, "uint16", "1", "how many identifications were applied, wraps"),
     Register("refusals", 249, "uint16", "1", "how many were refused, wraps"),
-    Register("refusal", 250, "uint16", "1", "why the last one was refused, as in *_reason; 0: it was applied"),
+    replace(_coded("refusal", 250, Refusal), text="why the last one was refused, as in *_reason; 0: it was applied"),
     *_estimate_registers_of("breakaway", 252, "Pa", "static friction F_s / A, from where the stem broke away"),
     *_estimate_registers_of("static_slope", 260, "Pa/m", "k_s / A of the static law, from landings"),
     *_estimate_registers_of("static_up", 266, "Pa", "friction and preload after a slide up, (F_c + F_0) / A"),
@@ -198,7 +210,7 @@ ESTIMATES = (
     Register("landings", 278, "uint16", "1", "slides that ended in rest, which the static law is taken from"),
     Register("static_residual", 280, "float32", "p.u.", "how far landings lie off the static law, standard deviation"),
     Register("offset_applied", 282, "float32", "Pa", "(up - down) / 2 as the law uses it; 0 in the seed's model"),
-    Register("sampling", 284, "uint16", "1", f"[device] sampling, as the last excitation found it: {texts(Sampling)}"),
+    _coded("sampling", 284, Sampling, "[device] sampling, as the last excitation found it"),
 )
 
 JITTER_BOUNDS_S = {
@@ -275,8 +287,8 @@ HEALTH = (
     _writable(
         "health_reset", 501, "uint16", "1", 0, 1, "write 1: travel, reversals and stiction index start anew; reads 0"
     ),
-    Register("ne107", 502, "uint16", "1", f"NAMUR NE 107: {texts(Ne107Status)}"),
-    Register("ne107_cause", 503, "uint16", "1", f"what decides ne107: {texts(Ne107Cause)}"),
+    _coded("ne107", 502, Ne107Status, "NAMUR NE 107"),
+    _coded("ne107_cause", 503, Ne107Cause, "what decides ne107"),
     Register("ne107_causes", 504, "uint16", "1", "causes that hold: bit n - 1 is cause n of ne107_cause, 1 to 16"),
     Register("ne107_causes_high", 505, "uint16", "1", "the same from 17 up: bit n - 17 is cause n"),
     Register("friction", 506, "float32", "Pa", "Coulomb friction F_c / A as the law uses it; NaN: none yet"),
@@ -298,7 +310,7 @@ HEALTH = (
         "the same under commands in the upper fifth of what the travel needs: the supply",
     ),
     Register("end_closed", 532, "float32", "p.u.", "opening where the valve is pressed shut, mean of today"),
-    Register("end_trend", 534, "uint16", "1", f"of that over the last days: {texts(EndTrend)}"),
+    _coded("end_trend", 534, EndTrend, "of that over the last days"),
     Register("exhausted", 536, "float32", "1", "air let out today, in volumes of the actuator at atmospheric pressure"),
     Register("moves_judged", 520, "uint32", "1", "moves behind the stiction index"),
 )
@@ -323,7 +335,7 @@ EXPERIMENT = (
         "experiment_start", 607, "uint16", "1", 2, MOST_EXPERIMENT_POINTS, "write the number of points: plays them"
     ),
     Register("experiment_points", 608, "uint16", "1", "how many there are"),
-    Register("experiment_state", 609, "uint16", "1", texts(ExperimentState)),
+    _coded("experiment_state", 609, ExperimentState),
     Register("experiment_elapsed", 610, "float32", "s", "time since its first point, while it is under way"),
     _writable("experiment_turn", 612, "float32", "p.u.", 0.0, 1.0, "travel at which it retraces its way; 0: never"),
     _writable("experiment_band", 614, "float32", "p.u.", 0.0, 1.0, "travel that breaks it off; 0: the window alone"),
@@ -331,8 +343,8 @@ EXPERIMENT = (
 
 EVENTS = (
     Register("event_number", 700, "uint32", "1", "how many events there were: the number of the newest"),
-    Register("event", 702, "uint16", "1", f"the newest: {texts(EventKind)}"),
-    Register("event_class", 703, "uint16", "1", f"its class by NAMUR NE 107: {texts(Ne107Status)}"),
+    _coded("event", 702, EventKind, "the newest"),
+    _coded("event_class", 703, Ne107Status, "its class by NAMUR NE 107"),
     Register("event_cause", 704, "uint16", "1", "its cause, a number of the code that goes with it (docs/history.md)"),
     Register("event_time", 706, "uint32", "s", "when it happened, since 1970, UTC"),
     Register("history_lost", 708, "uint32", "1", "entries of the history that were lost since the start"),

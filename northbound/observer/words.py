@@ -4,44 +4,11 @@ import math
 from collections.abc import Iterator, Mapping
 from dataclasses import dataclass
 
-from config.codes import (
-    Code,
-    EndTrend,
-    EventKind,
-    ExperimentState,
-    Fault,
-    InhibitReason,
-    Mode,
-    Ne107Cause,
-    Ne107Status,
-    Quality,
-    Refusal,
-    Restored,
-    Sampling,
-    ServiceState,
-    State,
-    cause_text,
-)
+from config.codes import EventKind, Fault, cause_text
 from config.quantities import DeviceStatus
-from config.registers import BY_NAME, ESTIMATED
+from config.registers import BY_NAME, ESTIMATED, REGISTERS
 
-CODES: dict[str, type[Code]] = {
-    "mode": Mode,
-    "state": State,
-    "service": ServiceState,
-    "fault": Fault,
-    "quality": Quality,
-    "why": InhibitReason,
-    "restored": Restored,
-    "refusal": Refusal,
-    "sampling": Sampling,
-    "experiment_state": ExperimentState,
-    "ne107": Ne107Status,
-    "ne107_cause": Ne107Cause,
-    "end_trend": EndTrend,
-    "event": EventKind,
-    "event_class": Ne107Status,
-}
+CODES = {register.name: register.codes for register in REGISTERS if register.codes is not None}
 """The code that each register of one serves."""
 
 CAUSE_BITS = {"ne107_causes": 0, "ne107_causes_high": 16} | dict.fromkeys(
@@ -122,8 +89,8 @@ def in_words(register: str, value: float, values: Mapping[str, float]) -> str:
     >>> in_words("eta_1", 0, {}), in_words("ne107_causes_high", 1, {}), in_words("event_cause", 2, {"event": 7})
     ('on', 'cycles or replies too slow', 'automatic')
     """
-    if register in CODES or register.endswith("_reason"):
-        return code_text(register if register in CODES else "refusal", value)
+    if register in CODES:
+        return code_text(register, value)
     if register in CAUSE_BITS:
         return ", ".join(ne107_causes(int(value) << CAUSE_BITS[register])) or "none"
     if register == "device_status":
