@@ -6,7 +6,7 @@ from pathlib import Path
 
 from config.errors import InputError
 
-HELP = "score this and other methods on loops and effects whose true cause is known"
+HELP = "score methods of diagnosis on loops and effects whose true cause is known"
 EXAMPLE = "positioner bench cases --drawn 300"
 RESULTS = "results.csv"
 

@@ -51,7 +51,7 @@ if TYPE_CHECKING:
     from config.valve_file import ValveParameters
     from positioner.dcs import Dcs
 
-HELP = "show both laws on a simulated sticking valve, over a real bus, in about a minute"
+HELP = "show two control laws on a simulated sticking valve, over a real bus, in about a minute"
 EXAMPLE = "positioner demo --out demo-out"
 
 PSI = 6894.757  # Pa
@@ -203,7 +203,7 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
         help="add an effect to the valve, find it in the daemon's recording, and give it to the law",
     )
     parser.add_argument(
-        "--loop", choices=("flow",), help="put each law into a flow loop in virtual time; needs a clone"
+        "--loop", choices=("flow",), help="simulate each law in a flow loop, faster than real time; needs a clone"
     )
     parser.add_argument("--out", type=Path, metavar="DIR", help="folder for picture, recordings, files and logs")
     parser.add_argument("--json", type=Path, metavar="FILE", help="write the result as JSON")

@@ -27,7 +27,9 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
         help="standard deviation of the position's noise (measured in the recording)",
     )
     parser.add_argument(
-        "--pressure", choices=("held", "linear"), help="pressure between samples: held or linear (the likelier)"
+        "--pressure",
+        choices=("held", "linear"),
+        help="pressure between samples: held or linear (the likelier of the two)",
     )
     add_export_arguments(parser)
 

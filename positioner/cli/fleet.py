@@ -12,7 +12,7 @@ if TYPE_CHECKING:
     from workbench.fleet.examination import Examination
     from workbench.fleet.manifest import Entry
 
-HELP = "rank many valves by their recordings; exit status 1 if a valve needs attention or is unknown"
+HELP = "rank many valves by their recordings; exit status 1 if a valve needs attention or could not be examined"
 EXAMPLE = "positioner fleet plant.csv --out fleet-out --report fleet.html"
 
 
@@ -41,7 +41,7 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
         type=int,
         default=10,
         metavar="N",
-        help="number of diagnosis reports with links, the gravest first (10)",
+        help="number of valves with a diagnosis report, the gravest first (10)",
     )
     parser.add_argument("--since", metavar="DATE", help="print what changed since that day")
     parser.add_argument("--picture", type=Path, metavar="FILE.png", help="with --since: draw it")

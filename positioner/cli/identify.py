@@ -20,10 +20,10 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
     parser.add_argument(
         "--alpha-pa",
         type=float,
-        help="for [excitation] kind = sine: its mean pressure, Pa; 0 is the pressure that holds the stem",
+        help="mean pressure of a sine, [excitation] kind; 0: the pressure that holds the stem",
     )
-    parser.add_argument("--beta-pa", type=float, help="for a sine: its amplitude, Pa")
-    parser.add_argument("--omega-rad-per-s", type=float, help="for a sine: its angular frequency, rad/s")
+    parser.add_argument("--beta-pa", type=float, help="amplitude of a sine")
+    parser.add_argument("--omega-rad-per-s", type=float, help="angular frequency of a sine")
     parser.add_argument("--timeout-s", type=float, default=600.0, help="give up after this many seconds (600)")
     add_connection(parser)
 

@@ -25,7 +25,7 @@ if TYPE_CHECKING:
     from positioner.daemon.snapshot import Snapshot
     from positioner.virtual.virtual_cycle import Script
 
-HELP = "simulate valve and controller faster than time: identify, then follow a reference"
+HELP = "simulate valve and controller, faster than real time: identify, then follow a reference"
 EXAMPLE = "positioner play seed --reference reference.csv --noise-m 1e-5 -o run.csv"
 
 IDENTIFY_S = 1.5

@@ -20,7 +20,7 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
         type=Path,
         required=True,
         metavar="PRESSURE.csv",
-        help="columns time_s and command_pa; each pressure holds until the next row (with a positioner: reference_m)",
+        help="columns time_s and command_pa (of a valve with a positioner reference_m); each row holds until the next",
     )
     parser.add_argument("-o", "--out", type=Path, required=True, metavar="REC.csv", help="the recording")
     parser.add_argument("--noise-m", type=float, default=0.0, help="standard deviation of the sensor's noise (0)")

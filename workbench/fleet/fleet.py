@@ -77,9 +77,9 @@ class Fleet(Result):
             (str(rank), each.name, each.kind, since_day(each), f"{100 * each.cost_share:.2f}", each.sure, _say(each))
             for rank, each in enumerate(self.complaining, start=1)
         ]
-        unknown = f", of {len(self.unknown)} nothing is known" if self.unknown else ""
+        unknown = f", {len(self.unknown)} could not be judged" if self.unknown else ""
         said: list[Block] = [
-            f"{len(self.complaining)} of {len(self.courses)} valves deserve a look{unknown}; {self.count} recordings, "
+            f"{len(self.complaining)} of {len(self.courses)} valves need attention{unknown}; {self.count} recordings, "
             f"{self.examined} of them examined now, {len(self.bad)} unreadable"
         ]
         if rows:

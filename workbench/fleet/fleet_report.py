@@ -57,9 +57,9 @@ def report_fleet(fleet: Fleet, path: Path, manifest: str, reports: Mapping[str, 
         parts.append(section("unreadable", "Recordings that could not be examined", bad))
     nothing_known = {course.name for course in fleet.unknown}
     well = [each.name for each in fleet.courses if not each.gravest and each.name not in nothing_known]
-    parts.append(section("well", "As their models say", text(", ".join(well) or "none")))
+    parts.append(section("well", "Valves without a finding", text(", ".join(well) or "none")))
     if nothing_known:
-        parts.append(section("unknown", "Nothing is known of", text(", ".join(sorted(nothing_known)))))
+        parts.append(section("unknown", "Valves that could not be judged", text(", ".join(sorted(nothing_known)))))
     write_without_plots(path, f"Fleet of {manifest}", parts)
 
 
@@ -73,13 +73,13 @@ def _ranking(fleet: Fleet) -> Html:
         for rank, course in enumerate(fleet.complaining, start=1)
     ]
     if not rows:
-        return section("ranking", "Valves that deserve a look", text("None: all are as their last models say."))
+        return section("ranking", "Valves that need attention", text("None: all follow their last models."))
     head = ("rank", "valve", "what", "since", "off by, % of stroke", "sure", "error over time")
     legend = (
-        "Error over time: of the model that held, in floors, by its logarithm; low is well. It leads to what is known."
+        "Error over time: of the last valid model, in floors, on a logarithmic scale. Press it for the valve's history."
     )
     ranked = table("ranked", head, rows, words=(1, 2, 3, 5, 6))
-    return section("ranking", "Valves that deserve a look", ranked, text(legend))
+    return section("ranking", "Valves that need attention", ranked, text(legend))
 
 
 def _drill_down(rank: int, course: ValveCourse, report: str | None) -> Html:
@@ -97,7 +97,7 @@ def _drill_down(rank: int, course: ValveCourse, report: str | None) -> Html:
         f"{rank}. {course.name}: {course.kind}",
         text(found.sentence),
         link_to(report, Html("The diagnosis report")) if report else Html(""),
-        table(f"history-{rank}", ("when", "recording", "came of it", "error before, mm"), history, words=(0, 1, 2)),
+        table(f"history-{rank}", ("when", "recording", "result", "error before, mm"), history, words=(0, 1, 2)),
         table(f"models-{rank}", ("model from", "by", "why"), models, words=(0, 1, 2)) if models else Html(""),
         table(f"tried-{rank}", ("effect", "held out, mm", ""), tried, words=(0, 2)) if tried else Html(""),
         keep_lines(command),

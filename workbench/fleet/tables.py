@@ -48,7 +48,7 @@ FIGURES = (
     Column("slips", "count", "times it began to move"),
     Column("error_before_m", "number", "of the model as it was, rms, m"),
     Column("error_after_m", "number", "of the model that explains the recording best, rms, m"),
-    Column("floor_m", "number", "what no model undercuts, rms, m"),
+    Column("floor_m", "number", "least error of any model, rms, m"),
     Column("dead_band_share", "number", "2 F_c / k_s of that model, of the stroke"),
     Column("jump_share", "number", "(F_s - F_c) / k_s of that model, of the stroke"),
     Column("evidence", "number", "for the effect added first, of what was fitted (BIC); above 10 it counts"),
@@ -71,7 +71,9 @@ TABLES: Mapping[str, tuple[str, tuple[Column, ...]]] = {
             ),
             Column("sure", "text", "sure, one of several, or not sure what"),
             Column(
-                "cost_share", "number", "how far the stem is from where the last good model has it, rms, of the stroke"
+                "cost_share",
+                "number",
+                "distance of the stem from where the last valid model puts it, rms, of the stroke",
             ),
             *(each for each in FIGURES if each.name in ("dead_band_share", "evidence", "held_out_evidence")),
             Column("drifting", "text", "parameters that changed more than once, always one way"),

@@ -203,14 +203,14 @@ class LoopDiagnosis(Result):
         return figure  # type: ignore[no-any-return]
 
 
-REMEDIES = "Of now, simulated on the identified loop (– where that does not swing as the record does):"
+REMEDIES = "Over today's, simulated on the identified loop (– if that does not swing as the record does):"
 ACTS = {
     1: "reverse acting, OP falls as PV rises",
     -1: "direct acting, OP rises as PV rises",
     0: "its action does not show, both signs of the process are tried",
 }
 """By the sign that the process's gain then has."""
-OPEN = "a record with larger moves, or 20 more cycles, would tell; so would the stem's own position"
+OPEN = "record larger moves, 20 more cycles, or the stem's own position"
 
 
 def ratio(value: float | None) -> str:
@@ -271,4 +271,4 @@ def _other(oscillation: Oscillation, setpoint: Oscillation | None, causes: Cause
         return "irregular disturbances, which the valve answers"
     curved = causes.costs["linear"] - causes.costs["nonlinear"] > 2.0 * LIMITS.interval_cost
     through = ", through a curved process or valve" if curved else ""
-    return f"tight tuning, or an oscillation from outside{through}: in manual it stops, or goes on"
+    return f"tight tuning, or an oscillation from outside{through}: in manual the first stops, the second goes on"

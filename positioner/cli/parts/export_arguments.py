@@ -27,15 +27,16 @@ def add_export_arguments(parser: argparse.ArgumentParser) -> None:
     parser.add_argument("--from-s", type=float, metavar="S", help="leave out samples before this time_s")
     parser.add_argument("--to-s", type=float, metavar="S", help="leave out samples after this time_s")
     export = parser.add_argument_group(
-        "exports in place of recordings", "CSV, .xlsx, .mat, Parquet; `positioner import FILE` proposes these options"
+        "files of other programs, in place of recordings",
+        "CSV, .xlsx, .mat, Parquet; `positioner import FILE` proposes these options",
     )
     export.add_argument(
         "--column",
         action="append",
         default=[],
         metavar="OURS=THEIRS:UNIT",
-        help="our column = column of the file : its unit, once for each column, as position_m=PV:%%. "
-        "#2 is the second column, Date+Time joins two, -%% counts from the other end",
+        help="read column THEIRS of the file, in UNIT, as column OURS of a recording: position_m=PV:%%; once for each "
+        "column. #2 is the second column, Date+Time joins two, -%% counts from the other end",
     )
     export.add_argument(
         "--mapping", type=Path, metavar="MAP.toml", help="read these options from a file; the command line wins"

@@ -24,7 +24,7 @@ def add_test(parser: argparse.ArgumentParser) -> None:
 
 def add_pressure(parser: argparse.ArgumentParser) -> None:
     """Declare that the stem is driven by its measured pressure, not by the model's."""
-    text = "use the measured pressure_pa as input; effects before it are not tried"
+    text = "drive the model by the measured pressure_pa; effects between command and pressure are not tried"
     parser.add_argument("--from-pressure", action="store_true", help=text)
 
 

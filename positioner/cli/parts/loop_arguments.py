@@ -12,7 +12,7 @@ if TYPE_CHECKING:
 
 def add_loop_arguments(parser: argparse.ArgumentParser) -> None:
     """Declare them."""
-    columns = parser.add_argument_group("columns", "needed only where the names in the file do not say it")
+    columns = parser.add_argument_group("columns", "needed only if the names in the file do not show them")
     for role, what in (
         ("time", "the time"),
         ("op", "the controller's output OP"),
