@@ -157,10 +157,7 @@ STATUS = (
     Register("restored_agreed", 123, "uint16", "1", "landings since then that agree with it"),
 )
 
-ESTIMATED = ("a", "b", "c", "k", "b_over_c", "k_over_c")
-"""What is identified, in register order."""
-
-_ESTIMATE_UNITS = {
+ESTIMATED = {
     "a": "1/s",
     "b": "1/s^2",
     "c": "m/(Pa s^2)",
@@ -168,7 +165,7 @@ _ESTIMATE_UNITS = {
     "b_over_c": "Pa/m",
     "k_over_c": "Pa",
 }
-
+"""What is identified, in register order, and in which unit."""
 
 TURNED = "; rad for m where it turns"
 """Of a register whose unit has a metre."""
@@ -185,10 +182,8 @@ def _estimate_registers_of(name: str, base: int, unit: str, text: str) -> tuple[
 
 
 def _estimate_registers() -> tuple[Register, ...]:
-    numbered = enumerate(ESTIMATED)
-    each = (
-        _estimate_registers_of(name, 200 + 6 * i, _ESTIMATE_UNITS[name], f"{name}, estimated") for i, name in numbered
-    )
+    numbered = enumerate(ESTIMATED.items())
+    each = (_estimate_registers_of(name, 200 + 6 * i, unit, f"{name}, estimated") for i, (name, unit) in numbered)
     return tuple(chain.from_iterable(each))
 
 

@@ -10,9 +10,9 @@ from collections.abc import Iterator
 from enum import Enum
 from typing import NamedTuple
 
-from config.registers import BY_NAME, ESTIMATED
+from config.registers import BY_NAME
 from northbound.observer import ValvePicture
-from northbound.observer.words import CODES, code_text, estimates_in_words
+from northbound.observer.words import CODES, IDENTIFIED, code_text, estimates_in_words
 from northbound.opcua.device_health import device_health
 
 PERCENT = 100.0  # of a share
@@ -58,13 +58,7 @@ STATES = {
 }
 """In folder `Status`: a node's name and the register of its code."""
 
-ESTIMATES = {
-    **{name: "".join(part.capitalize() for part in name.split("_")) for name in ESTIMATED},
-    "breakaway": "Breakaway",
-    "static_slope": "StaticSlope",
-    "static_up": "StaticUp",
-    "static_down": "StaticDown",
-}
+ESTIMATES = {name: "".join(part.capitalize() for part in name.split("_")) for name in IDENTIFIED}
 """In folder `Estimates`: a node's name by the estimate's; each has its deviation and why it is refused beside it."""
 
 

@@ -4,6 +4,7 @@ import argparse
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
+from config.registers import ESTIMATED
 from positioner.cli.parts.export_arguments import add_export_arguments, read_any
 from positioner.cli.parts.naming import naming
 from positioner.cli.parts.output_files import write_json
@@ -51,10 +52,8 @@ def run(arguments: argparse.Namespace) -> int:
 
 def as_json(estimated: "RecordingEstimates") -> dict[str, object]:
     """Return the numbers: per name value, std, valid and reason; null where there is none."""
-    from positioner.estimation.recording_estimates import UNITS
-
     found, law = estimated.found, estimated.static_law
-    numbers: dict[str, object] = {name: _one(getattr(estimated.estimates, name)) for name in UNITS}
+    numbers: dict[str, object] = {name: _one(getattr(estimated.estimates, name)) for name in ESTIMATED}
     return numbers | {
         "breakaway_pa": _one(estimated.estimates.breakaway),
         "noise_std_m": found.noise_std_m,

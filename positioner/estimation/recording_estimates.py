@@ -13,6 +13,7 @@ from config.arguments import kinds_held
 from config.errors import InputError
 from config.plausibility import odd_sizes
 from config.recording import Recording
+from config.registers import ESTIMATED
 from config.results.block import Block, Table
 from config.results.result import Result
 from positioner.estimation.array import Array
@@ -29,10 +30,6 @@ DEVIATIONS = 2.0
 """Standard deviations drawn on either side of an estimate."""
 MEASURED = 0.5
 """Share of the rows with a pressure from which on it counts as measured."""
-
-
-UNITS = {"a": "1/s", "b": "1/s^2", "c": "m/(Pa s^2)", "k": "m/s^2", "b_over_c": "Pa/m", "k_over_c": "Pa"}
-"""What is estimated, and in which unit."""
 
 
 @dataclass(frozen=True, slots=True, repr=False)
@@ -66,7 +63,7 @@ class RecordingEstimates(Result):
     @property
     def by_name(self) -> Mapping[str, tuple[Estimate, str]]:
         """Each estimate with its unit: of motion, the break-away pressure F_s / A, and of landings."""
-        named = {name: (getattr(self.estimates, name), unit) for name, unit in UNITS.items()}
+        named = {name: (getattr(self.estimates, name), unit) for name, unit in ESTIMATED.items()}
         law = self.static_law
         return named | {
             "F_s/A": (self.estimates.breakaway, "Pa"),
