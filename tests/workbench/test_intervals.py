@@ -1,5 +1,7 @@
 """Intervals hold where the valve scatters from move to move, and where only the sensor is noisy: rates over draws."""
 
+from dataclasses import replace
+
 import numpy as np
 import pytest
 from scipy.optimize import minimize_scalar
@@ -10,11 +12,12 @@ from sim.karnopp import Vector
 from tests.cases import few_always
 from tests.workbench.valves import SLIM, record_of
 from workbench.data.record import ready
+from workbench.fit.ends import search_about
 from workbench.fit.fit_result import terms
 from workbench.fit.likelihood import Groups, Likelihood, soft
-from workbench.fit.minimiser import End
+from workbench.fit.minimiser import Effort, End, derivatives, descend
 from workbench.fit.problem import problem
-from workbench.fit.uncertainty import uncertainty
+from workbench.fit.uncertainty import RISE_95, uncertainty
 
 DRAWS = 100
 TELL = 6
@@ -92,3 +95,37 @@ def test_each_landing_break_away_and_parameter_that_moved_is_one_witness(like: L
     assert found.moved.independent == 3
     assert found.rests.independent == np.unique(like.layout.rest_of).size
     assert 0.0 < found.motion.independent <= groups.motion.size
+
+
+def test_what_only_a_sum_of_two_coordinates_tells_is_open_in_their_difference(like: Likelihood) -> None:
+    """An onset that nothing hangs on does not hide it: columns of any length are weighed alike."""
+    onsets_s = like.run.first_onsets_s()
+    groups = like.at(like.composition.theta, onsets_s)
+    rows = groups.whole.size
+    generator = np.random.default_rng(2)
+    shared = 1e3 * generator.standard_normal((rows, 1))
+    onsets = np.zeros((rows, onsets_s.size))
+    onsets[:, 0] = 1e-9
+    twofold = problem(like.record, SLIM.valve).likelihood(Composition.from_file(SLIM), ["coulomb_n", "spring_n_per_m"])
+    end = End(np.zeros(2), onsets_s, 0.0, groups, np.hstack([shared, shared, onsets]))
+    found = uncertainty(twofold, end)
+    assert np.all(found.std > 1.0)
+    assert found.std.max() < 10.0
+
+
+def test_an_end_is_believed_where_no_place_that_it_leaves_open_leads_lower(like: Likelihood) -> None:
+    stopped = descend(like, like.coordinates(like.composition.theta) + 0.05, effort=Effort(0, 1.0))
+    begun = replace(stopped, jacobian=derivatives(like, stopped.z, stopped.onsets_s))
+    found = search_about(like, begun)
+    assert found.cost < begun.cost - 1.0
+    assert all(found.cost < other.cost < found.cost + RISE_95 for other in found.as_likely)
+    assert search_about(like, begun).cost == found.cost, "the places drawn are the same each time"
+
+
+def test_an_interval_reaches_over_another_end_that_is_as_likely(like: Likelihood) -> None:
+    end = descend(like, like.coordinates(like.composition.theta))
+    alone = uncertainty(like, end)
+    other = replace(end, z=end.z + 3.0 * alone.std, cost=end.cost + 0.5 * RISE_95)
+    both = uncertainty(like, replace(end, as_likely=(other,)))
+    assert both.upper[0] > other.z[0]
+    assert both.lower[0] == alone.lower[0]

@@ -6,6 +6,7 @@ Its files:
     problem            a record to be explained, made once
     likelihood         where the stem is, told when it moves, and what it takes to break it loose
     minimiser          lowers its cost
+    ends               whether other onsets or places lead lower from where it ends
     onsets             when each move begins, as suits a valve best
     starts, guesses    where searches begin; what the positions suggest
     fit_result         what it comes to

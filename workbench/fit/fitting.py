@@ -18,6 +18,7 @@ from sim.effect import Effect, find_effects
 from sim.karnopp import Vector
 from workbench.data.record import Record, ready, require_few_samples
 from workbench.data.stretches import informative
+from workbench.fit.ends import NATS, search_about, settle
 from workbench.fit.fit_result import Fit, Terms, fit_at, terms
 from workbench.fit.likelihood import Likelihood
 from workbench.fit.minimiser import COARSE, GLIMPSE, WHOLE, Effort, End, begin_by_landings, derivatives, descend
@@ -47,10 +48,6 @@ COARSE_ROUNDS = 2
 """Of parabolas for onsets from which a coarse search begins: it moves them itself."""
 SAME_COST = 1.01
 """Factor on the cost, and `NATS` besides, within which two searches have come to the same."""
-SETTLED_IN = 5
-"""Rounds of onsets and coordinates at most: two take nearly all."""
-NATS = 1.0
-"""Cost within which two ends are one."""
 
 
 @linear_algebra_alone()
@@ -126,9 +123,9 @@ def _base_fit(
     composition = Composition.from_file(valve)
     like = of.likelihood(composition, free)
     first, *others = starts(like)
-    ends = [_settle(like, _from_afar(like, first))]
+    ends = [settle(like, _from_afar(like, first))]
     if not at_the_noise(ends[0].cost, like.count):
-        ends += on_threads(lambda z: _settle(like, _from_afar(like, z)), others, workers)
+        ends += on_threads(lambda z: settle(like, _from_afar(like, z)), others, workers)
     best = min(ends, key=lambda each: each.cost)
     return _best(of, like, ends), not at_the_noise(best.cost, like.count)
 
@@ -238,7 +235,7 @@ def finish(of: Problem, trial: Trial) -> Fit:
     """Search to the end from the best valley of a trial, and from the next if it is nearly as good."""
     like, (first, *others) = trial.like, trial.valleys
     near = [first, *(each for each in others[:1] if each.cost < NEAR * first.cost)]
-    return _best(of, like, [_settle(like, descend(like, each.z, each.onsets_s)) for each in near])
+    return _best(of, like, [settle(like, descend(like, each.z, each.onsets_s)) for each in near])
 
 
 @linear_algebra_alone()
@@ -305,23 +302,12 @@ def _from_afar(
     return descend(like, landed, onsets_s, effort)
 
 
-def _settle(like: Likelihood, end: End) -> End:
-    """Search on where other onsets suit the valve better than those that a search came to, as long as it pays."""
-    for _ in range(SETTLED_IN):
-        onsets_s, groups = with_onsets(like, like.theta(end.z))
-        if like.cost(groups.whole) > end.cost - NATS:
-            break
-        there = descend(like, end.z, onsets_s)
-        end = min(end, there, key=lambda each: each.cost)
-    return end
-
-
 def at_the_noise(cost: float, count: int) -> bool:
     """Whether the cost of so many residuals leaves nothing that another start might find."""
     return cost <= AT_THE_NOISE * 0.5 * count
 
 
 def _best(of: Problem, like: Likelihood, ends: Sequence[End]) -> Fit:
-    best = min(ends, key=lambda each: each.cost)
-    same = sum(each.cost <= SAME_COST * best.cost + NATS for each in ends)
+    best = search_about(like, min(ends, key=lambda each: each.cost))
+    same = max(1, sum(each.cost <= SAME_COST * best.cost + NATS for each in ends))
     return fit_at(of, like, best, same + 1 if at_the_noise(best.cost, like.count) else same)

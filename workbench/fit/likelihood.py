@@ -242,11 +242,14 @@ class Likelihood:
         """Return the residuals of the second factor."""
         return np.asarray(self.rows_of_static(path, theta[STATIC : STATIC + 1])[0])
 
-    def rows_of_static(self, path: ToldPath, static_n: Vector) -> Vector:
-        """Return the residuals of the second factor with each of some static frictions, N, (frictions, rows)."""
+    def rows_of_static(self, path: ToldPath, static_n: Vector, wider: Vector | float = 1.0) -> Vector:
+        """Return the residuals of the second factor with each of some static frictions, N, (frictions, rows).
+
+        Wider: factor on L_0 of what broke each move loose, (rows,).
+        """
         F_s, bears, breaks = static_n[:, np.newaxis], path.bears_n[self.broken], path.breaks_n[self.broken]
         breaks = np.where(breaks > 0.0, breaks, np.inf)  # it slides on where the record rests: nothing breaks loose
-        off = np.maximum(bears - F_s, F_s - breaks) / self.load_n
+        off = np.maximum(bears - F_s, (F_s - breaks) / wider) / self.load_n
         return np.asarray(np.maximum(np.fmin(off, self.weights.wild), 0.0))
 
 

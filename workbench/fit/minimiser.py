@@ -256,6 +256,8 @@ class End:
     groups: Groups
     jacobian: Vector
     """Of the residuals by z and onsets, (rows, parameters + moves); empty where it was not asked for."""
+    as_likely: tuple["End", ...] = ()
+    """Other ends within the interval of 95 %."""
 
 
 def begin_by_landings(like: Likelihood, z: Vector) -> Vector:

@@ -1,0 +1,102 @@
+"""Where a search ends: whether other onsets, or places that the record leaves open, lead lower.
+
+The cost has edges, where a stem just sticks or just does not, and a descent may stay on one. An end is believed when
+descents from places drawn from what it leaves open come to nothing lower (iterated local search):
+
+    dz ~ N(0, S C),   do = -D^-1 C_o' dz      C as of `uncertainty`, S a little more than 1; onsets o follow their moves
+
+H = [A, C_o; C_o', D] by coordinates and onsets as of `minimiser`. Of each round's draws the cheapest is descended from.
+Ends that cost no more than 1.92 above the least belong to the interval of 95 %, however narrow the curvature there.
+"""
+
+from dataclasses import dataclass, replace
+
+import numpy as np
+
+from sim.karnopp import Vector
+from workbench.fit.likelihood import Likelihood, by_move, soft_weight
+from workbench.fit.minimiser import NO_SLOPE, End, descend
+from workbench.fit.onsets import SEARCH as ONSETS
+from workbench.fit.onsets import with_onsets
+from workbench.fit.uncertainty import RISE_95, uncertainty
+
+SETTLE_ROUNDS = 5
+"""Rounds of onsets and coordinates at most: two take nearly all."""
+NATS = 1.0
+"""Cost within which two ends are one."""
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Places:
+    """How places are drawn about an end."""
+
+    seed: int = 1
+    draws: int = 16
+    """Of a round: one simulation each, as many as a descent of a few steps takes."""
+    spread: float = 1.5
+    """Deviations: the next valley lies beyond what this one leaves open, but not far."""
+    farthest: float = 0.3
+    """Of a coordinate, a logarithm mostly: where little is known a draw is not thrown about."""
+    vain: int = 2
+    """Rounds in a row that come to nothing lower, after which an end is believed."""
+    rounds: int = 6
+    """At most."""
+    gain: float = 0.1
+    """Nats by which an end is lower than another: a third of a deviation."""
+
+
+PLACES = Places()
+
+
+def settle(like: Likelihood, end: End) -> End:
+    """Search on where other onsets suit the valve better than those that a search came to, as long as it pays."""
+    for _ in range(SETTLE_ROUNDS):
+        onsets_s, groups = with_onsets(like, like.theta(end.z))
+        if like.cost(groups.whole) > end.cost - NATS:
+            break
+        there = descend(like, end.z, onsets_s)
+        end = min(end, there, key=lambda each: each.cost)
+    return end
+
+
+def search_about(like: Likelihood, end: End) -> End:
+    """Search on from places that the record leaves open about an end, until none leads lower; with all as likely."""
+    generator, vain, ends = np.random.default_rng(PLACES.seed), 0, [end]
+    for _ in range(PLACES.rounds):
+        if vain == PLACES.vain or not end.z.size:
+            break
+        z, onsets_s = _cheapest(like, end, generator)
+        there = descend(like, z, onsets_s)
+        if there.cost < end.cost + NATS:
+            there = settle(like, there)
+        ends.append(there)
+        vain = vain + 1 if there.cost > end.cost - PLACES.gain else 0
+        end = min(end, there, key=lambda each: each.cost)
+    return replace(end, as_likely=tuple(each for each in ends if end.cost < each.cost < end.cost + RISE_95))
+
+
+def _cheapest(like: Likelihood, end: End, generator: np.random.Generator) -> tuple[Vector, Vector]:
+    """Return the coordinates and onsets, s, of the cheapest of some places drawn about an end."""
+    root, ends = uncertainty(like, end).root, np.array([each.bounds for each in like.parameters])
+    normal = generator.standard_normal((PLACES.draws, end.z.size))
+    steps = np.clip(PLACES.spread * np.linalg.lstsq(root, normal.T)[0].T, -PLACES.farthest, PLACES.farthest)
+    places = np.clip(end.z + steps, ends[:, 0], ends[:, 1])
+    follow = _onsets_by_z(like, end)
+    earliest_s, latest_s = like.run.bounds_s(ONSETS.reach)
+    onsets_s = [
+        np.clip(end.onsets_s + like.run.period_s * np.clip(follow @ (z - end.z), -1.0, 1.0), earliest_s, latest_s)
+        for z in places
+    ]
+    costs = [like.cost(like.at(like.theta(z), o).whole) for z, o in zip(places, onsets_s, strict=True)]
+    best = int(np.argmin(costs))
+    return places[best], onsets_s[best]
+
+
+def _onsets_by_z(like: Likelihood, end: End) -> Vector:
+    """Return by how many periods the best onsets move with each coordinate, (moves, parameters)."""
+    count, moves = end.z.size, len(like.moves)
+    by_z, by_onset = end.jacobian[:, :count], end.jacobian[:, count:].sum(axis=1)
+    weighed = soft_weight(end.groups.whole, like.weights.soft) * by_onset
+    D = by_move(like.move_of, weighed * by_onset, moves)
+    C_o = np.array([by_move(like.move_of, weighed * column, moves) for column in by_z.T]).reshape(count, moves)
+    return np.asarray(-np.where(D > NO_SLOPE, C_o / np.maximum(D, NO_SLOPE), 0.0).T)
