@@ -23,7 +23,7 @@ HELP = "find stroke, action and law of a valve, ask, and write the daemon's file
 EXAMPLE = "positioner commission site.toml"
 
 WARNING = (
-    "The valve will go from end to end, several times, for some four minutes. Whatever it controls must bear that: "
+    "The valve will go from end to end, several times, for four to five minutes. Whatever it controls must bear that: "
     "isolate it first."
 )
 NOT_THERE = (

@@ -132,6 +132,7 @@ def _commissioned(valve: Watching, name: str, bounds: Bounds, show: Callable[[st
     digit_m = max(digit_m, quantum_m(recordings[0].position_m))
     leak = _leak(held_still, sign, digit_m)
     steps = _steps(valve, bounds, start_pa, half_pa, friction, (travel.value, sign, name), show)
+    friction = of_one_that_sticks(friction, steps.figure("dead_band_pa"))
     kind = recordings[0].kind
     action: ActionWord = "air_to_open" if sign > 0 else "air_to_close"
     opening, closing = (up_s, down_s) if sign > 0 else (down_s, up_s)
@@ -145,7 +146,11 @@ def _commissioned(valve: Watching, name: str, bounds: Bounds, show: Callable[[st
         Quantity(
             "closed_m", "reading at the closed end", "m", Figure(closed_m, (low if sign > 0 else high).plus_minus)
         ),
-        *(each for each in found.quantities if each.name not in LEFT_OUT),
+        *(
+            replace(each, figure=friction) if each.name == "friction_pa" else each
+            for each in found.quantities
+            if each.name not in LEFT_OUT
+        ),
         Quantity("opening_s", "opens within", "s", opening),
         Quantity("closing_s", "closes within", "s", closing),
         Quantity("filling_pa_per_s", "pressure rises by", "Pa/s", filling),
@@ -293,6 +298,18 @@ def _steps(
     points = ((0.0, start_pa), *shifted, (shifted[-1][0] + way_s + 1e-3, start_pa))
     recording = _played(valve, Program("small steps", points), show)
     return small_steps.small_steps(_mirrored(recording, sign), name, travel_m)
+
+
+def of_one_that_sticks(friction: Figure, dead_band: Figure) -> Figure:
+    """Return friction as it is known beside a dead band, which is twice what the stem breaks loose at.
+
+    A stem that slides through the ramps in part shows less than one that sticks: that is the mean of where it breaks
+    loose and of where it stops, and it stops at no more than the ramps show.
+    """
+    if friction.value is None or dead_band.value is None:
+        return friction
+    open_pa = 0.5 * max(0.0, 0.5 * dead_band.value - friction.value)
+    return replace(friction, plus_minus=hypot(friction.plus_minus or 0.0, open_pa))
 
 
 def _supply(found: Outcome, bounds: Bounds) -> tuple[Figure, list[str]]:

@@ -65,13 +65,14 @@ def programmes(bounds: Bounds, start_pa: float, source: str = "experiment") -> t
     """
     span_pa, held_s = bounds.maximum_pa - bounds.minimum_pa, THRESHOLDS.end_held_s
     slow_s = min(THRESHOLDS.slowest_leg_s, _leg_s(bounds.longest_s))
-    shortest_s = max(THRESHOLDS.shortest_leg_s, THRESHOLDS.rate_ratio * span_pa / bounds.rate_pa_per_s)
+    shortest_s = max(THRESHOLDS.shortest_leg_s, THRESHOLDS.least_rate_ratio * span_pa / bounds.rate_pa_per_s)
     if slow_s < shortest_s:
         least_s = time_limit_s(shortest_s)
         raise InputError(
             source, f"experiment.limit_s: a signature needs {least_s:.3g} s or more, got {bounds.longest_s:g}"
         )
-    fast_s = max(slow_s / THRESHOLDS.rate_ratio, span_pa / bounds.rate_pa_per_s)
+    fast_s = min(slow_s / THRESHOLDS.least_rate_ratio, max(slow_s / THRESHOLDS.rate_ratio, THRESHOLDS.shortest_leg_s))
+    fast_s = max(fast_s, span_pa / bounds.rate_pa_per_s)
     first, last = Leap(bounds.minimum_pa, held_s), Leap(start_pa, held_s)
     up_and_down = (Leap(bounds.maximum_pa, held_s), first)
     slow = ramped("slow ramps", start_pa, (first, *up_and_down, last), span_pa / slow_s)

@@ -63,9 +63,11 @@ class Thresholds:
     moved_sigmas: float = 5.0
     """Deviations of the noise beyond which a leg has moved the stem."""
 
-    rate_ratio: float = 3.0
-    """Of the fast rate to the slow one: taken to no rate, the slow ramp's error grows by 3/2. At four times, a stem
-    that sticks by a third slides all the way, and its friction comes out 1.5 % high."""
+    rate_ratio: float = 6.0
+    """Of the fast rate to the slow one, q. A stem that sticks at the slow rate shows friction F_m, one that slides at
+    the fast one F_c: at no rate that is (F_m - F_c) / (q - 1) too much. The slow ramp's error grows by q / (q - 1)."""
+    least_rate_ratio: float = 3.0
+    """The same where the time limit leaves no more: with less the slow ramp's error grows by more than half."""
     end_held_s: float = 1.0
     """At each end of a ramp, for the stem to come to rest."""
     slowest_leg_s: float = 60.0
@@ -110,7 +112,7 @@ class Thresholds:
     """Before anything moves, for noise, digit and creep."""
     creep_s: float = 30.0
     """From the least command to the most, while the direction is sought."""
-    commissioning_leg_s: float = 20.0
+    commissioning_leg_s: float = 40.0
     """Of a slow ramp in commissioning, which has five minutes for all."""
     stroke_held_s: float = 6.0
     """At each end, for a stroke to be over."""

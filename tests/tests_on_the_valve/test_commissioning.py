@@ -19,8 +19,9 @@ from positioner.cli.main import main
 from positioner.cli.parts.own_valve import unknown_travel
 from positioner.control.played_experiment import ROUNDING
 from positioner.control.settings import Settings
+from positioner.response.figure import Figure, no_value
 from positioner.tests_on_the_valve.air_rates import air_rates
-from positioner.tests_on_the_valve.commissioning import Commissioned, commission
+from positioner.tests_on_the_valve.commissioning import Commissioned, commission, of_one_that_sticks
 from positioner.tests_on_the_valve.small_steps import SmallSteps, programme, small_steps
 from tests.control.virtual_loop import VirtualLoop
 from tests.tests_on_the_valve.virtual_valve import (
@@ -217,6 +218,17 @@ def test_values_go_into_a_text_whose_comments_stay(
 def test_a_text_that_cannot_be_changed_by_a_line_is_refused(text: str) -> None:
     with pytest.raises(InputError, match="by hand"):
         with_values(text, {("a", "x"): 2})
+
+
+@pytest.mark.parametrize(
+    ("dead_band", "plus_minus"),
+    [(Figure(7500.0, 300.0), 275.0), (Figure(6000.0, 300.0), 50.0), (no_value("noise"), 50.0)],
+)
+def test_friction_of_a_stem_that_sticks_is_known_no_better_than_it_sticks(dead_band: Figure, plus_minus: float) -> None:
+    """It breaks loose at 3750 Pa and stops at no more than 3200: the mean is within 275 Pa above what ramps show."""
+    told = of_one_that_sticks(Figure(3200.0, 50.0), dead_band)
+    assert told.value == 3200.0
+    assert told.plus_minus == pytest.approx(plus_minus, rel=0.02)
 
 
 def test_small_steps_bracket_dead_band_and_resolution() -> None:

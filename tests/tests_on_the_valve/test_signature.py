@@ -39,6 +39,7 @@ PLATE = Nameplate("FV-1", STROKE_M, AREA_M2)
 NOISE = 0.01
 """Of the span."""
 TIGHT = told(coulomb_n=400.0, static_n=440.0)
+SMOOTH = told(coulomb_n=400.0, static_n=401.0)
 TABLED = {"friction_n": 0.03, "spring_n_per_m": 0.01, "bench_low_pa": 0.02, "bench_high_pa": 0.02, "seat_load_n": 0.02}
 """Relative errors that are allowed."""
 
@@ -83,13 +84,14 @@ def test_every_figure_is_the_truth_within_what_is_asked(file: ValveFile) -> None
 
 
 def test_lag_is_told_from_friction() -> None:
-    prompt, late = (signature(recorded(each), PLATE) for each in (TIGHT, lagging(TIGHT, 0.3)))
+    """The stem breaks loose at what it slides at: one that sticks shows more friction than one that slides."""
+    prompt, late = (signature(recorded(each), PLATE) for each in (SMOOTH, lagging(SMOOTH, 0.3)))
     rate = late.figure("friction_at_rate_pa").value, late.figure("friction_pa").value
     assert rate[0] is not None
     assert rate[1] is not None
     slowest_pa_per_s = MAXIMUM_PA / 60.0
-    assert rate[0] - rate[1] == pytest.approx((0.3 + 0.5 * PERIOD_S) * slowest_pa_per_s, rel=0.25)
-    assert rate[1] == pytest.approx(prompt.figure("friction_pa").value, rel=0.03)
+    assert rate[0] - rate[1] == pytest.approx((0.3 + 0.5 * PERIOD_S) * slowest_pa_per_s, rel=0.1)
+    assert rate[1] == pytest.approx(prompt.figure("friction_pa").value, rel=0.015)
 
 
 def test_the_plus_minus_is_true_of_most_draws() -> None:
@@ -97,12 +99,11 @@ def test_the_plus_minus_is_true_of_most_draws() -> None:
 
     The stem breaks loose at what it slides at: else friction itself is what lies between the two.
     """
-    smooth = told(coulomb_n=400.0, static_n=401.0)
     short = replace(BOUNDS, longest_s=100.0)
     beyond = 0
     for seed in range(10):
-        outcome = signature(recorded(smooth, seed=seed, bounds=short), PLATE)
-        for name, true in truth(smooth).items():
+        outcome = signature(recorded(SMOOTH, seed=seed, bounds=short), PLATE)
+        for name, true in truth(SMOOTH).items():
             figure = outcome.figure(name)
             assert figure.value is not None
             beyond += abs(figure.value - true) > (figure.plus_minus or 0.0)
