@@ -18,7 +18,7 @@ from cryptography import x509
 from cryptography.hazmat.primitives.serialization import Encoding
 from cryptography.x509.oid import ExtendedKeyUsageOID
 
-from config.codes import Mode
+from config.codes import Mode, Ne107Cause
 from config.role_passwords import set_password
 from northbound.opcua.address_space import OURS
 from northbound.opcua.valve_nodes import SETPOINT, SIGNAL
@@ -32,6 +32,7 @@ pytestmark = pytest.mark.patient
 
 SECRET = "a password of "
 ADJUST = "SignalSet.Position.AutoAdjustPositioner"
+HISTORY_AND_ALARM = "[history]\nfolder = 'history'\n[alarms.high]\nthreshold = 0.6\n"
 START = ua.Variant(2, ua.VariantType.Int32)
 
 
@@ -96,7 +97,7 @@ def site(tmp_path_factory: pytest.TempPathFactory) -> Iterator[Site]:
     (folder / "keys" / "trusted").mkdir(parents=True)
     (folder / "keys" / "trusted" / "client.pem").write_bytes((folder / "client.pem").read_bytes())
     with running("sim", slave_file(folder), "--listen-port", "0") as slave:
-        file = daemon_file(folder, port_in(slave), "[history]\nfolder = 'history'\n", PATIENT)
+        file = daemon_file(folder, port_in(slave), HISTORY_AND_ALARM, PATIENT)
         file.write_text(file.read_text().replace("2e-3", "10e-3"))
         with running("run", file) as daemon:
             port = port_in(daemon)
@@ -172,7 +173,7 @@ def test_who_subscribes_is_told_each_event_once_with_kind_cause_and_severity(sit
 
         class Handler:
             def event_notification(self, event: Any) -> None:
-                if event.Kind == "MODE":
+                if event.Kind == "MODE" or event.Kind.startswith("ALARM"):
                     told.put_nowait(event)
 
         types = await valve.client.get_node(ua.ObjectIds.BaseEventType).get_children()
@@ -181,17 +182,30 @@ def test_who_subscribes_is_told_each_event_once_with_kind_cause_and_severity(sit
         source = valve.client.nodes.server if of_the_server else valve()
         await subscription.subscribe_events(source, kind)
         with Dcs("127.0.0.1", site.daemon_port) as dcs:
-            for mode in (Mode.MANUAL, Mode.HOLD):
-                await asyncio.to_thread(dcs.set, "mode", mode)
-                await asyncio.sleep(1.0)
-        return [await asyncio.wait_for(told.get(), 20) for _ in range(2)]
+            writes = (
+                {"mode": Mode.MANUAL},
+                {"manual_pressure": 85e3},
+                {"alarm_acknowledge": Ne107Cause.HIGH},
+                {"manual_pressure": 0.0},
+                {"mode": Mode.HOLD},
+            )
+            events = []
+            for write in writes:
+                await asyncio.to_thread(dcs.set_all, write)
+                events.append(await asyncio.wait_for(told.get(), 20))
+        return events
 
-    first, second = site.seen("observer", look)
-    assert [(each.Kind, each.Cause, each.Severity) for each in (first, second)] == [
-        ("MODE", Mode.MANUAL, 400),
-        ("MODE", Mode.HOLD, 400),
+    events = site.seen("observer", look)
+    assert [(each.Kind, each.Cause) for each in events] == [
+        ("MODE", Mode.MANUAL),
+        ("ALARM_RAISED", Ne107Cause.HIGH),
+        ("ALARM_ACKNOWLEDGED", Ne107Cause.HIGH),
+        ("ALARM_RETURNED", Ne107Cause.HIGH),
+        ("MODE", Mode.HOLD),
     ]
-    assert second.Number > first.Number
+    first = events[0]
+    assert [each.Severity for each in events] == [400, 300, 100, 100, 400]
+    assert sorted(each.Number for each in events) == [each.Number for each in events]
     assert first.SourceName == "FV-101"
     assert "mode" in first.Message.Text
 

@@ -3,6 +3,7 @@
 from collections.abc import Iterator
 from contextlib import contextmanager
 from pathlib import Path
+from unittest.mock import Mock
 
 import numpy as np
 import pytest
@@ -76,7 +77,7 @@ def written(folder: Path, action: ActionWord, monkeypatch: pytest.MonkeyPatch) -
     def in_memory(_file: DaemonFile, _source: Path) -> Iterator[VirtualValve]:
         yield stranger
 
-    monkeypatch.setattr("positioner.cli.parts.own_valve.own_valve", in_memory)
+    monkeypatch.setattr("positioner.cli.commission.own_valve", in_memory)
     yield site, stranger
 
 
@@ -196,7 +197,11 @@ def test_a_daemon_that_serves_the_valve_is_in_service(tmp_path: Path, capsys: py
         site = tmp_path / "site.toml"
         site.write_text(f"[valve]\nstroke_m = 0.04\n[supervisory]\nport = {served.getsockname()[1]}\n")
         assert main(["commission", str(site), "--yes"]) == 1
-    assert "the valve is in service; end that daemon first" in capsys.readouterr().err
+        assert "the valve is in service; end that daemon first" in capsys.readouterr().err
+        with pytest.MonkeyPatch.context() as patched:
+            patched.setattr(socket, "create_connection", Mock(side_effect=TimeoutError("timed out")))
+            assert main(["commission", str(site), "--yes"]) == 1
+        assert "cannot be told: timed out" in capsys.readouterr().err, "a daemon that has not come to answer is one"
 
 
 @pytest.mark.parametrize(

@@ -74,7 +74,7 @@ def on_the_bus(valve: ValveFile) -> Iterator[None]:
         yield OnTheBus(file, valve)
 
     with pytest.MonkeyPatch.context() as patched:
-        patched.setattr("positioner.cli.parts.own_valve.own_valve", own_valve)
+        patched.setattr("positioner.cli.commission.own_valve", own_valve)
         patched.setattr("positioner.cli.parts.experiment_player.require_ready", lambda *_: None)
         patched.setattr("positioner.cli.parts.experiment_player.RunningValve", lambda file, _: OnTheBus(file, valve))
         yield

@@ -64,7 +64,7 @@ def site(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Path:
     def in_memory(file: DaemonFile, _source: Path) -> Iterator[Rotary]:
         yield Rotary(file)
 
-    monkeypatch.setattr("positioner.cli.parts.own_valve.own_valve", in_memory)
+    monkeypatch.setattr("positioner.cli.commission.own_valve", in_memory)
     monkeypatch.setattr("positioner.cli.parts.experiment_player.require_ready", lambda *_: None)
     monkeypatch.setattr("positioner.cli.parts.experiment_player.RunningValve", lambda file, _: Rotary(file))
     path = tmp_path / "site.toml"

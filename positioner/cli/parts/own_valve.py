@@ -70,17 +70,20 @@ def require_no_daemon(file: "DaemonFile") -> None:
     """Refuse a valve that a daemon serves where the file says it would.
 
     Raises:
-        CommandFailed: one answers there.
+        CommandFailed: one answers there, or whether one does cannot be told.
     """
-
     where = file.supervisory
     if where.port == 0:
         return
     try:
         with socket.create_connection((where.host, where.port), ANSWERS_WITHIN_S):
             pass
-    except OSError:
+    except ConnectionRefusedError:
         return
+    except OSError as error:
+        raise CommandFailed(
+            f"whether a daemon serves this valve at {where.host}:{where.port} cannot be told: {error}"
+        ) from None
     raise CommandFailed(
         f"a daemon serves this valve at {where.host}:{where.port}: the valve is in service; end that daemon first"
     )
