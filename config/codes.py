@@ -113,7 +113,7 @@ class InhibitReason(Code):
     AMPLITUDE_ZERO = 7, "amplitude is zero"
     LAW_BEYOND_LIMITS = 8, "the law asks for a pressure beyond the limits"
     STUCK = 9, "stuck: the longest slide allowed does not move the stem"
-    TRIM_ENDED = 10, "the trim ended outside its dead band"
+    TRIM_ENDED = 10, "the move ended outside the dead band"
     EXCURSION_BEYOND_LIMIT = 11, "a small move needs an excursion beyond [control] excursion_limit"
     EXCURSION_WAITS = 12, "a small move waits: the last excursion was too recent"
     STAIRCASE_IN_VAIN = 13, "the staircase of slides gave no static law (see its reason)"

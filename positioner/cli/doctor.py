@@ -170,7 +170,7 @@ def _sampling(nudge_pa: float, file: "DaemonFile", _config: Path) -> str:
     from drivers.boundary import DriverError
 
     if file.cycle.pace == "device":
-        return "in lockstep: a reply is of after its command has been obeyed for a period"
+        return "in lockstep: a reply shows the valve one period after its command"
     least_pa = file.device.command_step_pa
     driver = driver_for(file.device)
     try:
@@ -184,8 +184,8 @@ def _sampling(nudge_pa: float, file: "DaemonFile", _config: Path) -> str:
     finally:
         driver.close()
     if shown.sampling != file.device.sampling:
-        raise FailedCheck(f'it samples {shown.sampling} the command: device.sampling = "{shown.sampling}"')
-    return f"{shown.sampling} the command, whose change showed {shown.replies} replies later"
+        raise FailedCheck(f'it samples {shown.sampling} the write: set device.sampling = "{shown.sampling}"')
+    return f"it samples {shown.sampling} the write; the change showed {shown.replies} replies later"
 
 
 def _supervisory(file: "DaemonFile", _config: Path) -> str:
@@ -241,7 +241,7 @@ def _recorder(file: "DaemonFile", config: Path) -> str:
 def _memory(file: "DaemonFile", config: Path) -> str:
     folders = (("what is known of the valve", file.memory.folder), ("its wear", file.health.folder))
     kept = [f"{what} in {_writable(config.parent / each)}" for what, each in folders if each is not None]
-    return ", ".join(kept) or "none configured: a restart knows nothing of the last ([memory] folder)"
+    return ", ".join(kept) or "none configured: a restart begins without what was identified ([memory] folder)"
 
 
 def _history(file: "DaemonFile", config: Path) -> str:

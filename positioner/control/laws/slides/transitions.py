@@ -407,19 +407,19 @@ class Rule(NamedTuple):
 
 
 MOVING = (
-    Rule((Out,), gone_far_enough, (Returning,), "the first of two slides is far enough beyond, and goes on no more"),
+    Rule((Out,), gone_far_enough, (Returning,), "the excursion is far enough beyond, and ends"),
     Rule(COMMANDING, reference_far_off, (Sliding,), "a new reference lies far from a stem that moves"),
-    Rule(UNDER_WAY, overdue, (Waiting, Out), "no rest for longer than any stem takes"),
+    Rule(UNDER_WAY, overdue, (Waiting, Out), "no rest came in the longest time that a stem takes"),
 )
 AT_REST = (
     Rule(COMMANDING, there, (Idle,), "the stem is within the dead band"),
-    Rule(COMMANDING, as_near_as_slides_land, (Idle,), "it is as near as slides land, or on its stop"),
-    Rule(COMMANDING, no_slide_left, (Idle, Stuck), "the move has had its slides"),
-    Rule(COMMANDING, one_slide, (Sliding, Returning, Idle, Stuck), "the reference is farther than break-away"),
-    Rule(COMMANDING, preslid, (Presliding,), "the packing gives way as far as the reference"),
-    Rule(COMMANDING, taken_back, (Idle,), "references to come take the error back"),
+    Rule(COMMANDING, as_near_as_slides_land, (Idle,), "the error is as slides leave it, or the stem is on its stop"),
+    Rule(COMMANDING, no_slide_left, (Idle, Stuck), "the move has used up its slides"),
+    Rule(COMMANDING, one_slide, (Sliding, Returning, Idle, Stuck), "the error is more than the break-away distance"),
+    Rule(COMMANDING, preslid, (Presliding,), "presliding reaches the reference"),
+    Rule(COMMANDING, taken_back, (Idle,), "coming references will reduce the error"),
     Rule(COMMANDING, excursion_waits, (Idle,), "the last excursion was too recent"),
-    Rule(COMMANDING, two_slides, (Out, Idle, Stuck), "else: an excursion, where the site's bounds let it"),
+    Rule(COMMANDING, two_slides, (Out, Idle, Stuck), "else: an excursion, if the site's limits allow it"),
 )
 TABLE = (*MOVING, *AT_REST)
 
