@@ -53,7 +53,7 @@ def _days(arguments: argparse.Namespace) -> "tuple[OperationDay, ...]":
     """Return the days that the daemon keeps; none without its file."""
     from config.daemon_file import load_daemon
     from positioner.daemon.health.health_file import kept_days
-    from positioner.daemon.health.health_keeper import health_path
+    from positioner.daemon.kept_alone import health_path
 
     if arguments.config is None:
         return ()

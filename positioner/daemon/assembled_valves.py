@@ -32,11 +32,11 @@ from positioner.daemon.cycles_together import SLOT_S, CyclesTogether
 from positioner.daemon.end_signals import Endings
 from positioner.daemon.first_look import impossible
 from positioner.daemon.health import Health, HealthKeeper, HealthSettings, StoredHealth, ne107_condition
-from positioner.daemon.health.ne107 import Ne107Condition, classes_of
-from positioner.daemon.history import HistoryKeeper, ValveHistory
+from positioner.daemon.health.ne107 import classes_of
+from positioner.daemon.history import HistoryKeeper
 from positioner.daemon.history.decision_events import Happened
 from positioner.daemon.history.health_hours import HealthLook
-from positioner.daemon.keeping_thread import Keeping, Kept
+from positioner.daemon.keeping_thread import Keeping
 from positioner.daemon.kept_alone import keep_alone
 from positioner.daemon.link import Link, LinkSettings
 from positioner.daemon.local_switch import locks_out
@@ -196,7 +196,7 @@ class AssembledValves:
             for keeper in valve.keepers:
                 keeper.start()
                 self._on_exit.callback(keeper.stop)
-        keeping = Keeping([Kept(keeper, valve.name) for valve in self._valves for keeper in valve.keepers])
+        keeping = Keeping([keeper for valve in self._valves for keeper in valve.keepers])
         keeping.start()
         self._on_exit.callback(keeping.stop)
         prepare_process(len(self._threads))
@@ -254,7 +254,11 @@ def _assembled(
         if said := impossible(file, held_pa, reading, settings.limits):
             raise InputError(where, said)
     recorder = _recorder(file, source)
-    memory = _memory(file, extended, source)
+    memory = (
+        None
+        if file.memory.folder is None
+        else StoredMemory.in_folder(source.parent / file.memory.folder, file.valve.name, conditions_of(file, extended))
+    )
     controller = Controller(
         settings,
         held_pa,
@@ -278,30 +282,27 @@ def _assembled(
     )
     keepers: list[HealthKeeper | MemoryKeeper] = [
         HealthKeeper(
-            health, lambda: cycle.snapshot, file.valve.name, stored, partial(_tell_of_health, happened), alarms
+            health,
+            lambda: cycle.snapshot,
+            file.valve.name,
+            stored,
+            lambda now: happened.happened(Happened(EventKind.HEALTH, now.status, now.cause)),
+            alarms,
         )
     ]
     health.watch.tested(last_tested_s(records_folder(file, source)))
     if memory is not None:
-        keepers.append(_memory_keeper(memory, file.valve.name, controller, cycle))
+        keepers.append(
+            MemoryKeeper(
+                memory,
+                file.valve.name,
+                decided=lambda: cycle.snapshot.decision,
+                knowledge=lambda: controller.knowledge,
+                now_s=lambda: cycle.snapshot.sample.now_s,
+            )
+        )
     return ServedValve(
         file, settings, link, controller, cycle, pace, recorder, tuple(keepers), unreachable_reason, locked, alarms
-    )
-
-
-def _memory(file: DaemonFile, extended: ExtendedValve | None, source: Path) -> StoredMemory | None:
-    if file.memory.folder is None:
-        return None
-    return StoredMemory.in_folder(source.parent / file.memory.folder, file.valve.name, conditions_of(file, extended))
-
-
-def _memory_keeper(memory: StoredMemory, valve: str, controller: Controller, cycle: Cycle) -> MemoryKeeper:
-    return MemoryKeeper(
-        memory,
-        valve,
-        decided=lambda: cycle.snapshot.decision,
-        knowledge=lambda: controller.knowledge,
-        now_s=lambda: cycle.snapshot.sample.now_s,
     )
 
 
@@ -351,10 +352,6 @@ def _look(cycle: Cycle, health: Health) -> HealthLook:
         counts.lost_replies,
         cycle.recorder.unrecorded if cycle.recorder else 0,
     )
-
-
-def _tell_of_health(history: ValveHistory, condition: Ne107Condition) -> None:
-    history.happened(Happened(EventKind.HEALTH, condition.status, condition.cause))
 
 
 def _first_requests(file: DaemonFile) -> Requests:

@@ -5,7 +5,6 @@ evenly over the second: so none waits for all the others, and no cycle for more 
 """
 
 from collections.abc import Sequence
-from dataclasses import dataclass
 from itertools import cycle
 from threading import Event, Thread
 from typing import Protocol
@@ -13,29 +12,25 @@ from typing import Protocol
 from positioner.daemon.logs import logging_valve
 
 EVERY_S = 1.0
+WRITE_EVERY_CHECKS = 60
+"""Looks of a keeper, after which its file is written at the latest."""
 
 
 class Keeper(Protocol):
-    """What is looked at."""
+    """What is looked at, and its valve by its name in the log."""
+
+    valve: str
 
     def check(self) -> None:
         """Look once."""
         ...
 
 
-@dataclass(frozen=True, slots=True)
-class Kept:
-    """A keeper, and its valve by its name in the log."""
-
-    keeper: Keeper
-    valve: str
-
-
 class Keeping:
     """A thread from `start` to `stop`; its death ends the daemon, as that of any."""
 
-    def __init__(self, kept: Sequence[Kept]) -> None:
-        self._kept = tuple(kept)
+    def __init__(self, keepers: Sequence[Keeper]) -> None:
+        self._keepers = tuple(keepers)
         self._stopping = Event()
         self._thread = Thread(target=self._work, name="keeping", daemon=True)
 
@@ -49,8 +44,8 @@ class Keeping:
         self._thread.join()
 
     def _work(self) -> None:
-        for each in cycle(self._kept):
-            if self._stopping.wait(EVERY_S / len(self._kept)):
+        for each in cycle(self._keepers):
+            if self._stopping.wait(EVERY_S / len(self._keepers)):
                 return
             with logging_valve(each.valve):
-                each.keeper.check()
+                each.check()

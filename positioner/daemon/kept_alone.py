@@ -3,12 +3,21 @@
 import os
 from contextlib import ExitStack
 from pathlib import Path
+from urllib.parse import quote
 
 from config.daemon_file import DaemonFile
 from config.errors import explain_failure
 from config.lock_file import take_lock
-from positioner.daemon.health.health_keeper import health_path
-from positioner.daemon.memory.memory_keeper import memory_path
+
+
+def health_path(folder: Path, valve: str) -> Path:
+    """Return the file of a valve's health."""
+    return folder / f"{quote(valve, safe=' ')}.health.json"
+
+
+def memory_path(folder: Path, valve: str) -> Path:
+    """Return the file of what is known of a valve."""
+    return folder / f"{quote(valve, safe=' ')}.memory.json"
 
 
 def keep_alone(file: DaemonFile, beside: Path, on_exit: ExitStack) -> None:

@@ -18,6 +18,7 @@ shows none, the command counts: in lockstep the one just sent, under which a per
 import logging
 import math
 import time
+from collections.abc import Callable
 from dataclasses import dataclass
 from threading import Semaphore
 
@@ -165,22 +166,13 @@ class Link:
     def open(self) -> tuple[float, Reading]:
         """Connect for the first time; return the command in force in the device, in Pa, and a first reading.
 
-        A reply that is lost is asked for again: one alone ends no daemon that runs, and so none that begins.
-
         Raises:
             DriverError: the device is not there or does not answer as it should.
         """
-        for _ in range(TRIES_AT_START - 1):
-            try:
-                return self._opened()
-            except NoReply as error:
-                self._say(logging.WARNING, "no reply at the start, asked again", reason=str(error))
-                self._driver.close()
-        return self._opened()
-
-    def _opened(self) -> tuple[float, Reading]:
-        held_pa = self._driver.open()
-        reading = self._driver.read()
+        said = "no reply at the start, asked again"
+        held_pa, reading = first_reading(
+            self._driver, lambda error: self._say(logging.WARNING, said, reason=str(error))
+        )
         self._connected = self._was_reached = True
         self._was_away = False
         return self._in_force_pa(held_pa, reading), reading
@@ -486,6 +478,23 @@ class Link:
             self.counts.lost_samples += max(passed - 1, 0)
             return passed == 0
         return _same_sample(before, reading)
+
+
+def first_reading(driver: Driver, tell: Callable[[NoReply], None]) -> tuple[float, Reading]:
+    """Connect; return the command that the device holds, Pa, and a reading.
+
+    A reply that is lost is told, and asked for again: one alone ends no daemon that runs, and so none that begins.
+
+    Raises:
+        DriverError: the device is not there or does not answer as it should.
+    """
+    for _ in range(TRIES_AT_START - 1):
+        try:
+            return driver.open(), driver.read()
+        except NoReply as error:
+            tell(error)
+            driver.close()
+    return driver.open(), driver.read()
 
 
 def _same_sample(before: Reading, reading: Reading) -> bool:

@@ -1,9 +1,16 @@
-"""`doctor --nudge-pa`: how long it waits for the change to show, and that the command is put back whatever happens."""
+"""`doctor --nudge-pa`: how long it waits for the change to show, and that the command is put back whatever happens.
+
+And what a lost reply is to it.
+"""
+
+from pathlib import Path
 
 import pytest
 
+from config.daemon_file import DaemonFile
 from config.errors import CommandFailed
-from drivers.boundary import NoConnection, NoReply, Reading
+from drivers.boundary import Capabilities, NoConnection, NoReply, Reading
+from positioner.cli import doctor, probe
 from positioner.cli.parts import sampling
 from positioner.cli.parts.sampling import SETTLE, Shown, when_shown
 
@@ -71,3 +78,40 @@ def test_what_hinders_the_clean_up_does_not_hide_the_first_error() -> None:
     assert str(caught.value) == (
         "no reply within 50 ms; and the command could not be put back to 50000 Pa: nobody is there any more"
     )
+
+
+class Lossy(Slow):
+    """A driver that loses so many replies to readings, one in a row."""
+
+    capabilities = Capabilities(one_transaction=True, device_time=False, sample_counter=False)
+
+    def __init__(self, loses: int) -> None:
+        super().__init__(0)
+        self.loses = loses
+
+    def read(self) -> Reading:
+        if not self.is_open:
+            raise NoConnection("the driver is not open")
+        self.replies += 1
+        if self.loses and self.replies % 2 == 0:
+            self.loses -= 1
+            self.close()
+            raise NoReply("no reply within 50 ms")
+        return Reading(0.05, HELD_PA)
+
+
+@pytest.mark.parametrize(
+    ("loses", "said"), [(0, "a reading"), (1, "its reply was lost"), (2, "2 of 100 readings had no")]
+)
+def test_one_lost_reply_fails_no_device_and_more_are_said(
+    loses: int, said: str, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """The daemon asks again, too; `run` began with a device of which `doctor` said that it is not there."""
+    file = DaemonFile.model_validate({"valve": {"stroke_m": 0.1}, "cycle": {"period_s": 0.5}})
+    monkeypatch.setattr(probe, "watching_driver", lambda _file: Lossy(loses))
+    try:
+        found = doctor._bus(file, Path())
+    except doctor.FailedCheck as failed:
+        found = str(failed)
+        assert loses > 1
+    assert said in found

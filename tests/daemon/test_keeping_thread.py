@@ -6,7 +6,7 @@ from threading import Event
 import pytest
 
 from positioner.daemon import keeping_thread
-from positioner.daemon.keeping_thread import Keeping, Kept
+from positioner.daemon.keeping_thread import Keeping
 
 WITHIN_S = 30.0
 
@@ -15,10 +15,10 @@ class Looked:
     """A keeper that notes who was looked at, and tells when that was often enough."""
 
     def __init__(self, name: str, order: list[str], often: Event) -> None:
-        self.name, self.order, self.often = name, order, often
+        self.valve, self.order, self.often = name, order, often
 
     def check(self) -> None:
-        self.order.append(self.name)
+        self.order.append(self.valve)
         if len(self.order) >= 9:
             self.often.set()
 
@@ -27,7 +27,7 @@ def test_all_are_looked_at_in_turn_by_one_thread(monkeypatch: pytest.MonkeyPatch
     monkeypatch.setattr(keeping_thread, "EVERY_S", 1e-3)
     order: list[str] = []
     often, before = Event(), threading.active_count()
-    one = Keeping([Kept(Looked(name, order, often), name) for name in "abc"])
+    one = Keeping([Looked(name, order, often) for name in "abc"])
     one.start()
     assert threading.active_count() == before + 1
     assert often.wait(WITHIN_S)
@@ -38,7 +38,7 @@ def test_all_are_looked_at_in_turn_by_one_thread(monkeypatch: pytest.MonkeyPatch
 
 def test_it_ends_at_once_however_long_it_waits(monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setattr(keeping_thread, "EVERY_S", 1e6)
-    one = Keeping([Kept(Looked("a", [], Event()), "a")])
+    one = Keeping([Looked("a", [], Event())])
     one.start()
     one.stop()
     assert not one._thread.is_alive()
@@ -57,10 +57,12 @@ def test_what_a_look_raises_is_the_death_of_the_thread(monkeypatch: pytest.Monke
     monkeypatch.setattr(threading, "excepthook", note)
 
     class Broken:
+        valve = "a"
+
         def check(self) -> None:
             raise OverflowError("too large")
 
-    one = Keeping([Kept(Broken(), "a")])
+    one = Keeping([Broken()])
     one.start()
     assert told.wait(WITHIN_S)
     one.stop()

@@ -9,7 +9,6 @@ import time
 from collections.abc import Callable
 from dataclasses import dataclass
 from pathlib import Path
-from urllib.parse import quote
 
 from config.codes import Ne107Cause, Ne107Status
 from config.errors import explain_failure
@@ -26,18 +25,12 @@ from positioner.daemon.health.health_file import (
 )
 from positioner.daemon.health.ne107 import Ne107Condition, ne107_condition
 from positioner.daemon.health.valve_health import Health
+from positioner.daemon.keeping_thread import WRITE_EVERY_CHECKS
+from positioner.daemon.kept_alone import health_path
 from positioner.daemon.logs import log_event, logging_valve
 from positioner.daemon.snapshot import Snapshot
 
 log = logging.getLogger(__name__)
-
-WRITE_EVERY_CHECKS = 60
-"""Of a second each (`positioner.daemon.keeping_thread`)."""
-
-
-def health_path(folder: Path, valve: str) -> Path:
-    """Return the file of a valve."""
-    return folder / f"{quote(valve, safe=' ')}.health.json"
 
 
 @dataclass(frozen=True, slots=True)
@@ -84,7 +77,7 @@ class HealthKeeper:
             self._alarms.begin(
                 {Ne107Cause[name]: Alarm(**dict(each)) for name, each in stored.kept.more.alarms.items()}
             )
-        self._valve = valve
+        self.valve = valve
         self._file = stored
         self._tell = tell
         self._written = (health.record, self._more)
@@ -95,12 +88,12 @@ class HealthKeeper:
     def start(self) -> None:
         """Say if what was kept cannot be read, or its baseline is of other scales."""
         if self._file is not None:
-            with logging_valve(self._valve):
+            with logging_valve(self.valve):
                 _say_of(self._file)
 
     def stop(self) -> None:
         """Keep the counts."""
-        with logging_valve(self._valve):
+        with logging_valve(self.valve):
             self.store(self._health.record)
 
     def check(self) -> None:
@@ -133,7 +126,7 @@ class HealthKeeper:
         if self._file is None or (record, more) == self._written:
             return
         try:
-            write_record(self._file.path, self._valve, record, self._file.scales, more)
+            write_record(self._file.path, self.valve, record, self._file.scales, more)
         except OSError as error:
             if not self._failed:
                 fields = {"file": str(self._file.path), "reason": error.strerror}

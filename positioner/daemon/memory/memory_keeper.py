@@ -9,25 +9,18 @@ import logging
 from collections.abc import Callable
 from dataclasses import dataclass
 from pathlib import Path
-from urllib.parse import quote
 
 from config.codes import Restored
 from config.errors import explain_failure
 from positioner.control.controller_memory import Decision
 from positioner.control.valve_knowledge import ValveKnowledge
+from positioner.daemon.keeping_thread import WRITE_EVERY_CHECKS
+from positioner.daemon.kept_alone import memory_path
 from positioner.daemon.logs import log_event, logging_valve
 from positioner.daemon.memory.conditions import Conditions
 from positioner.daemon.memory.memory_file import Kept, read_memory, set_aside, write_memory
 
 log = logging.getLogger(__name__)
-
-WRITE_EVERY_CHECKS = 60
-"""Of a second each (`positioner.daemon.keeping_thread`)."""
-
-
-def memory_path(folder: Path, valve: str) -> Path:
-    """Return the file of a valve."""
-    return folder / f"{quote(valve, safe=' ')}.memory.json"
 
 
 @dataclass(frozen=True, slots=True)
@@ -70,7 +63,7 @@ class MemoryKeeper:
         knowledge: Callable[[], ValveKnowledge | None],
         now_s: Callable[[], float],
     ) -> None:
-        self._stored, self._valve = stored, valve
+        self._stored, self.valve = stored, valve
         self._decided, self._knowledge, self._now_s = decided, knowledge, now_s
         self._trust = Restored.NOTHING if stored.kept.knowledge is None else Restored.PROVISIONAL
         self._identifications = 0
@@ -80,7 +73,7 @@ class MemoryKeeper:
     def start(self) -> None:
         """Say what was restored, or why it was not."""
         kept, file = self._stored.kept, str(self._stored.path)
-        with logging_valve(self._valve):
+        with logging_valve(self.valve):
             if kept.problem is not None:
                 log_event(log, logging.WARNING, "memory set aside", file=file, reason=kept.problem)
             elif kept.knowledge is not None:
@@ -88,7 +81,7 @@ class MemoryKeeper:
 
     def stop(self) -> None:
         """Keep what is known."""
-        with logging_valve(self._valve):
+        with logging_valve(self.valve):
             self.check()
             self.store()
 
@@ -111,7 +104,7 @@ class MemoryKeeper:
             return
         try:
             aged = knowledge.aged(self._now_s())
-            write_memory(self._stored.path, self._valve, self._stored.conditions, aged)
+            write_memory(self._stored.path, self.valve, self._stored.conditions, aged)
         except OSError as error:
             self._say_failed(error)
             return

@@ -10,7 +10,7 @@ import pytest
 from config.errors import InputError
 from positioner.daemon.health import Health, HealthKeeper, HealthRecord, StoredHealth
 from positioner.daemon.health.health_file import KeptHealth, read_record, write_record
-from positioner.daemon.health.health_keeper import health_path
+from positioner.daemon.kept_alone import health_path
 from positioner.daemon.snapshot import Snapshot
 
 KEPT = HealthRecord(12.5, 340, 0.25, 17, 22e3)

@@ -14,10 +14,10 @@ from config.errors import InputError
 from positioner.control.controller_memory import Decision
 from positioner.control.restoration import Restoration
 from positioner.control.valve_knowledge import ValveKnowledge
+from positioner.daemon.keeping_thread import WRITE_EVERY_CHECKS
 from positioner.daemon.memory import MemoryKeeper, StoredMemory
 from positioner.daemon.memory.conditions import conditions_of
 from positioner.daemon.memory.memory_file import SET_ASIDE
-from positioner.daemon.memory.memory_keeper import WRITE_EVERY_CHECKS
 from positioner.estimation.acceptance import Applied, Ratios
 
 FIRST = ValveKnowledge(Ratios(-8e5, -2e4), ((1.0, 0.0, 0.0), (0.0, 1.0, 0.0), (0.0, 0.0, 1.0)), 1e-5)
