@@ -40,6 +40,8 @@ def test_a_slow_ramp_is_left_to_come_until_an_excursion_saves_more_than_it_costs
     for unlike_m in ((0.06, 0.0601, 0.0602, 0.0601, 0.0602, 0.0603), (0.06, 0.061, 0.0611, 0.062, 0.0621, 0.063)):
         course, now_s = written(unlike_m, every_s=20.0)
         assert not course.takes_back(now_s, 0.9 * at_most_m, WAY_M, 0.5)
+    course, now_s = written([0.06 + 1e-4 * i for i in range(6)], every_s=1800.0)
+    assert not course.takes_back(now_s, 1e-4, WAY_M, 0.5), "each stands for half an hour: they are no ramp"
 
 
 def test_a_ramp_that_goes_farther_than_a_slide_is_followed_by_single_slides_ahead_of_it() -> None:

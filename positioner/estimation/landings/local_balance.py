@@ -89,10 +89,18 @@ class LocalBalance:
         """Return by how much the landings are bent away from B_0 at a position, Pa."""
         return self._bend.bent_by_pa(position_m / self.stroke_m, direction)
 
-    def ahead_m(self, each: SlideOutcome) -> float:
-        """Return how far a change of the command sends a stem that breaks loose, m, by B where it starts from."""
-        ahead_pa = each.command_pa - self.pressure_pa(each.from_m, each.direction)
-        return each.direction * ahead_pa / -self.ratios.b_over_c
+    def sent_m(self, each: SlideOutcome, swing: float) -> float:
+        """Return how far a change of the command sends a stem that breaks loose, m, by B where it starts from.
+
+        Args:
+            each: what the change did.
+            swing: ρ, share of its way by which the stem swings past its balance.
+        """
+        s, from_pa = each.direction, self.pressure_pa(each.from_m, each.direction)
+        if self.valve is None:
+            return s * (each.command_pa - from_pa) / -self.ratios.b_over_c / (1.0 - swing)
+        followed_pa = from_pa - self.valve.landing_pa(each.from_m, s)
+        return s * (self.valve.lands_m(each.command_pa - followed_pa, s) - each.from_m)
 
     @property
     def scatter_m(self) -> float:

@@ -31,6 +31,7 @@ from positioner.control.laws.slides.slide_bounds import SlideBounds
 from positioner.control.laws.slides.slide_memory import Anchor
 from positioner.estimation.landings.breakaway_distance import BreakawayDistance, Interval, Local
 from positioner.estimation.landings.landing_detector import VISIBLE
+from positioner.estimation.landings.packing_compliance import compliance
 
 
 class Excursion(NamedTuple):
@@ -98,7 +99,7 @@ class Plan:
         s = 1 if error_m > 0 else -1
         if not self.preslides or abs(error_m) > thresholds.longest_giving * self.bounds.stroke_m:
             return None
-        gives = self.balance.compliance(s)
+        gives = compliance(self.balance.held, s)
         if gives is None or gives.spread > thresholds.preslid_within:
             return None
         command_pa = from_pa + error_m / gives.m_per_pa

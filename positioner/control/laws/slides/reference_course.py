@@ -19,7 +19,8 @@ come to e, each e/v: a mean square of e^2/3 + m^2 T v/e, which is least where e^
 m = 7.5 %, T = 0.5 s: e = 1.8 %, every 14 s.
 
 A ramp may be written more slowly than a DCS scans. Four steps alike, in one direction, each and each interval no more
-than twice the least, are one, and of its error is left alone what two slides would cost more than they save, as above.
+than twice the least, within a minute of each other, are one, and of its error is left alone what two slides would cost
+more than they save, as above.
 
 A ramp followed by slides of a way m, for no shorter one breaks the stem loose, leaves a sawtooth. Slides that land at
 the reference leave errors of 0 to m, rms m/sqrt(3), those that land ahead of it by half of m
@@ -76,7 +77,8 @@ class ReferenceCourse:
         ways_m, intervals_s = zip(*self.steps, strict=True)
         least_m, most_m = sorted((min(ways_m), max(ways_m)), key=abs)
         factor = THRESHOLDS.alike_step_factor
-        alike = 0.0 < most_m / least_m <= factor and max(intervals_s) <= factor * min(intervals_s)
+        longest_s = min(factor * min(intervals_s), THRESHOLDS.ramp_step_s)
+        alike = 0.0 < most_m / least_m <= factor and max(intervals_s) <= longest_s
         goes_on = now_s - self.changed_s <= THRESHOLDS.overdue * max(intervals_s)
         return abs(sum(ways_m)) / sum(intervals_s) if alike and goes_on else 0.0
 

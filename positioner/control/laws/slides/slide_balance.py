@@ -15,7 +15,6 @@ from positioner.control.laws.slides.slide_bounds import THRESHOLDS
 from positioner.estimation.landings.breakaway_distance import BreakawayDistance, Interval, Local
 from positioner.estimation.landings.landing_detector import VISIBLE, SlideOutcome
 from positioner.estimation.landings.local_balance import LocalBalance
-from positioner.estimation.landings.packing_compliance import Compliance, compliance
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -30,13 +29,9 @@ class Balance(LocalBalance):
         """Return the pressure under which a slide from rest ends at a place, Pa: at its balance, or swung past it."""
         return self.pressure_pa(to_m - self.swing * (to_m - from_m), direction, abs(to_m - from_m))
 
-    def compliance(self, direction: int) -> Compliance | None:
-        """Return how far the packing gives way in a direction; None: it does not."""
-        return compliance(self.held, direction)
-
     def tried(self, way_m: float, direction: int) -> int:
         """Return how many of the last slides that landed in a direction were sent about so far, m."""
-        sent_m = (self._sent_m(each) for each in self.landings if each.direction == direction)
+        sent_m = (self.sent_m(each, self.swing) for each in self.landings if each.direction == direction)
         return sum(abs(each_m - way_m) < THRESHOLDS.sent_alike * way_m for each_m in sent_m)
 
     @property
@@ -95,7 +90,7 @@ class Balance(LocalBalance):
         slid = self._of(self.landings, direction)
         slid_m = [self._in_the_middle_m(each, abs(each.position_m - each.from_m)) for each in slid]
         first = Interval(broke_m=min(slid_m) / (1.0 - self.swing), seen=True) if slid_m else guess
-        held_m = (self._in_the_middle_m(each, self._sent_m(each)) for each in self._of(self.held, direction))
+        held_m = (self._in_the_middle_m(each, self.sent_m(each, self.swing)) for each in self._of(self.held, direction))
         seen_m = (each_m for each_m in held_m if VISIBLE * self.stroke_m < each_m < first.broke_m)
         return replace(first, held_m=max(seen_m, default=0.0))
 
@@ -105,14 +100,6 @@ class Balance(LocalBalance):
 
     def _of(self, slides: Sequence[SlideOutcome], direction: int) -> list[SlideOutcome]:
         return [each for each in slides if each.direction == direction]
-
-    def _sent_m(self, each: SlideOutcome) -> float:
-        """Return how far a slide would have gone, m, by the balance at the place it starts from."""
-        s, from_pa = each.direction, self.pressure_pa(each.from_m, each.direction)
-        if self.valve is not None:
-            followed_pa = from_pa - self.valve.landing_pa(each.from_m, s)
-            return s * (self.valve.lands_m(each.command_pa - followed_pa, s) - each.from_m)
-        return s * (each.command_pa - from_pa) / -self.ratios.b_over_c / (1.0 - self.swing)
 
     def _shape_pa(self, position_m: float, direction: int) -> float:
         """Return B as it goes over the travel, Pa, without what only the last landings near a place say."""

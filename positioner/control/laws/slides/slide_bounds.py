@@ -83,7 +83,9 @@ class SlideThresholds:
     steps_alike: int = 4
     """Steps that are a slow ramp ..."""
     alike_step_factor: float = 2.0
-    """... and the factor by which they and their intervals may differ: steps of a hand hardly do so."""
+    """... the factor by which they and their intervals may differ: steps of a hand hardly do so ..."""
+    ramp_step_s: float = 60.0
+    """... and s, by which they may be apart: a reference that stands for longer rests, and is to be met."""
 
 
 THRESHOLDS = SlideThresholds()

@@ -42,8 +42,6 @@ def _after_slide(memory: SlideMemory, outcome: SlideOutcome, now: "Now") -> Slid
     if slide is None:
         return memory
     way_m, went_m, missed_m = slide.way_m, slide.went_m(to_m), abs(slide.to_m - to_m)
-    if missed_m <= now.seen.quantum_m:  # the sensor does not tell the two apart, and the balance is finer
-        went_m = way_m
     near_m = max(thresholds.missed * way_m, now.seen.quantum_m)
     half_way = went_m > thresholds.gave_way * way_m
     moved = missed_m <= near_m or abs(to_m - outcome.from_m) > thresholds.longest_giving * stroke_m or half_way
