@@ -89,7 +89,7 @@ class LocalBalance:
         """Return by how much the landings are bent away from B_0 at a position, Pa."""
         return self._bend.bent_by_pa(position_m / self.stroke_m, direction)
 
-    def sent_m(self, each: SlideOutcome, swing: float) -> float:
+    def ahead_m(self, each: SlideOutcome, swing: float) -> float:
         """Return how far a change of the command sends a stem that breaks loose, m, by B where it starts from.
 
         Args:

@@ -167,7 +167,7 @@ class StaticIdentification:
         if not self.law.valid:
             return inf, 0.0
         went_m = outcome.direction * (outcome.position_m - outcome.from_m)
-        should_m = self._balance.sent_m(outcome, self.law.swing)
+        should_m = self._balance.ahead_m(outcome, self.law.swing)
         return abs(went_m - should_m), OFF * self._stroke_m + 3.0 * (self._balance.scatter_m + outcome.std_m)
 
     def _gave_way(self, outcome: SlideOutcome, off_m: float, near_m: float) -> bool:

@@ -31,7 +31,7 @@ class Balance(LocalBalance):
 
     def tried(self, way_m: float, direction: int) -> int:
         """Return how many of the last slides that landed in a direction were sent about so far, m."""
-        sent_m = (self.sent_m(each, self.swing) for each in self.landings if each.direction == direction)
+        sent_m = (self.ahead_m(each, self.swing) for each in self.landings if each.direction == direction)
         return sum(abs(each_m - way_m) < THRESHOLDS.sent_alike * way_m for each_m in sent_m)
 
     @property
@@ -90,7 +90,9 @@ class Balance(LocalBalance):
         slid = self._of(self.landings, direction)
         slid_m = [self._in_the_middle_m(each, abs(each.position_m - each.from_m)) for each in slid]
         first = Interval(broke_m=min(slid_m) / (1.0 - self.swing), seen=True) if slid_m else guess
-        held_m = (self._in_the_middle_m(each, self.sent_m(each, self.swing)) for each in self._of(self.held, direction))
+        held_m = (
+            self._in_the_middle_m(each, self.ahead_m(each, self.swing)) for each in self._of(self.held, direction)
+        )
         seen_m = (each_m for each_m in held_m if VISIBLE * self.stroke_m < each_m < first.broke_m)
         return replace(first, held_m=max(seen_m, default=0.0))
 
