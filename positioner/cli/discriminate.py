@@ -21,7 +21,7 @@ if TYPE_CHECKING:
     from workbench.discriminate.experiment_design import Bounds, DesignedExperiment
 
 HELP = "diagnose, then play experiments until one of several equally good effects is left (moves the valve)"
-EXAMPLE = "positioner discriminate site.toml --rec rec.csv --valve better.toml --out told"
+EXAMPLE = "positioner discriminate site.toml --rec rec.csv --valve better.toml --out experiments"
 
 EXPERIMENT = "experiment-{}.csv"
 BROKEN_OFF = "nothing is named; what was played is in"

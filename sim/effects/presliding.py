@@ -27,7 +27,7 @@ LOOKS = (
 )
 CONFOUNDED = {
     "presliding_hysteresis": "small cycles of the pressure below break-away: a loop only if energy is lost",
-    "backlash": "restarts in the same direction after a hold: the packing yields again, the play is taken up",
+    "backlash": "restarts in the same direction after a hold: the packing yields again, the backlash is taken up",
     "stribeck": "small steps against a stuck stem: only presliding moves it",
     "quantisation": "small steps against a stuck stem: presliding follows each in proportion, a quantum not or wholly",
 }

@@ -38,7 +38,7 @@ LOOKS = (
 )
 CONFOUNDED = {
     "presliding": "small cycles of the pressure below break-away: a loop only if energy is lost",
-    "backlash": "small cycles of growing height: a loop of the packing grows with them, a play's has one width",
+    "backlash": "small cycles of growing height: a loop of the packing grows with them, a backlash has one width",
 }
 
 

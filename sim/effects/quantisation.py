@@ -16,7 +16,7 @@ COMPLAINT = "lost calibration"
 LOOKS = "The indication takes few values, all a multiple of q: a slow ramp looks like a staircase of equal stairs."
 CONFOUNDED = {
     "static_n": "the heights of the stairs: the quantum's are all alike and stand at the same places, stick-slip's not",
-    "backlash": "a slow ramp without a reversal: the quantum shows equal stairs, the play nothing",
+    "backlash": "a slow ramp without a reversal: the quantum shows equal stairs, the backlash nothing",
     "presliding": "small steps against a stuck stem: presliding follows each in proportion, a quantum not or wholly",
 }
 
