@@ -12,9 +12,8 @@ from positioner.daemon.snapshot import Snapshot
 class WriteRejected(Exception):
     """A write that is not taken: the Modbus exception that answers it, and the reason for the log."""
 
-    def __init__(self, code: ExcCodes, reason: str) -> None:
-        self.code = code
-        self.reason = reason
+    def __init__(self, reason: str, code: ExcCodes = ExcCodes.ILLEGAL_VALUE) -> None:
+        self.reason, self.code = reason, code
 
 
 def experiment_asked(before: ExperimentRequest, values: Mapping[str, float], stroke_m: float) -> ExperimentRequest:
@@ -30,18 +29,15 @@ def experiment_asked(before: ExperimentRequest, values: Mapping[str, float], str
     if any(each is not None for each in point):
         number, time_s, pressure_pa = point
         if number is None or time_s is None or pressure_pa is None:
-            raise WriteRejected(ExcCodes.ILLEGAL_VALUE, "experiment_point: point, time and pressure go in one request")
+            raise WriteRejected("experiment_point: point, time and pressure go in one request")
         if number not in (0, len(after.points)):
-            raise WriteRejected(
-                ExcCodes.ILLEGAL_VALUE, f"experiment_point: the next is {len(after.points)}, or 0, got {number:g}"
-            )
+            raise WriteRejected(f"experiment_point: the next is {len(after.points)}, or 0, got {number:g}")
         after = replace(after, points=(*after.points[: int(number)], (time_s, pressure_pa)))
         if number == 0:  # another sequence, which has a turn and a band of its own, or none
             after = replace(after, turn_m=0.0, band_m=0.0)
     if "experiment_start" in values:
         if values["experiment_start"] != len(after.points):
             raise WriteRejected(
-                ExcCodes.ILLEGAL_VALUE,
                 f"experiment_start: there are {len(after.points)} points, not {values['experiment_start']:g}",
             )
         after = replace(after, starts=after.starts + 1)

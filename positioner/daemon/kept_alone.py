@@ -9,15 +9,12 @@ from config.daemon_file import DaemonFile
 from config.errors import explain_failure
 from config.lock_file import take_lock
 
-
-def health_path(folder: Path, valve: str) -> Path:
-    """Return the file of a valve's health."""
-    return folder / f"{quote(valve, safe=' ')}.health.json"
+HEALTH, MEMORY = "health", "memory"
 
 
-def memory_path(folder: Path, valve: str) -> Path:
-    """Return the file of what is known of a valve."""
-    return folder / f"{quote(valve, safe=' ')}.memory.json"
+def kept_path(folder: Path, valve: str, what: str) -> Path:
+    """Return the file in which a valve's HEALTH is kept, or the MEMORY of what is known of it."""
+    return folder / f"{quote(valve, safe=' ')}.{what}.json"
 
 
 def keep_alone(file: DaemonFile, beside: Path, on_exit: ExitStack) -> None:
@@ -31,8 +28,8 @@ def keep_alone(file: DaemonFile, beside: Path, on_exit: ExitStack) -> None:
     Raises:
         InputError: another daemon has them, or a folder cannot be made.
     """
-    kept = ((file.health.folder, health_path), (file.memory.folder, memory_path))
-    for path in (path_of(beside / folder, file.valve.name) for folder, path_of in kept if folder is not None):
+    kept = ((file.health.folder, HEALTH), (file.memory.folder, MEMORY))
+    for path in (kept_path(beside / folder, file.valve.name, what) for folder, what in kept if folder is not None):
         with explain_failure(path, "cannot be kept there"):
             path.parent.mkdir(parents=True, exist_ok=True)
             lock = take_lock(path.with_name(f"{path.name}.lock"), f"another daemon keeps {path.name} there")

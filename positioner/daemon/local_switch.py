@@ -26,7 +26,7 @@ def require_let_in(names: Iterable[str], locked: Callable[[], bool]) -> None:
         WriteRejected: the switch locks it out.
     """
     if set(names) - LET_IN and locked():
-        raise WriteRejected(ExcCodes.DEVICE_BUSY, "writes are locked out by the local switch")
+        raise WriteRejected("writes are locked out by the local switch", ExcCodes.DEVICE_BUSY)
 
 
 def _is_on(switch: Path) -> bool:

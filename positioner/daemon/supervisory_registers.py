@@ -18,6 +18,7 @@ import time
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import replace
 from importlib.metadata import version
+from operator import attrgetter
 
 from pymodbus.constants import ExcCodes
 
@@ -57,7 +58,6 @@ from positioner.daemon.logs import log_event, logging_valve
 from positioner.daemon.service_state import state_by_mode
 from positioner.daemon.site_registers import event_getters, site_getters
 from positioner.daemon.snapshot import Snapshot
-from positioner.estimation.estimates import Estimate
 
 log = logging.getLogger(__name__)
 
@@ -170,13 +170,13 @@ class SupervisoryRegisters:
             register = AT.get(at)
             if register is None or register.access == "r":
                 raise WriteRejected(
-                    ExcCodes.ILLEGAL_ADDRESS, f"{register.name if register else at}: nothing to write there"
+                    f"{register.name if register else at}: nothing to write there", ExcCodes.ILLEGAL_ADDRESS
                 )
             if register.address != at or register.end > end:
-                raise WriteRejected(ExcCodes.ILLEGAL_ADDRESS, f"{register.name}: takes {register.format.words} words")
+                raise WriteRejected(f"{register.name}: takes {register.format.words} words", ExcCodes.ILLEGAL_ADDRESS)
             value = register.format.decode(words[at - address : register.end - address])
             if problem := register.problem_with(value):
-                raise WriteRejected(ExcCodes.ILLEGAL_VALUE, problem)
+                raise WriteRejected(problem)
             values[register.name] = value
             at = register.end
         return values
@@ -229,17 +229,17 @@ class SupervisoryRegisters:
     def _mode(self, value: float) -> Mode:
         mode, fault = Mode(int(value)), self._cycle.snapshot.decision.fault
         if mode is not Mode.HOLD and fault is not Fault.NONE:
-            raise WriteRejected(ExcCodes.DEVICE_BUSY, f"mode: fault {fault.name} is latched, acknowledge it first")
+            raise WriteRejected(f"mode: fault {fault.name} is latched, acknowledge it first", ExcCodes.DEVICE_BUSY)
         return mode
 
     def _require_friction(self) -> None:
         if self._cycle.snapshot.decision.applied.ratios is None:
-            raise WriteRejected(ExcCodes.DEVICE_BUSY, "health_baseline: no friction has been identified yet")
+            raise WriteRejected("health_baseline: no friction has been identified yet", ExcCodes.DEVICE_BUSY)
 
     def _manual_pa(self, value: float) -> float:
         if not self._minimum_pa <= value <= self._maximum_pa:
             allowed = f"{self._minimum_pa:g} to {self._maximum_pa:g} Pa"
-            raise WriteRejected(ExcCodes.ILLEGAL_VALUE, f"manual_pressure: allowed is {allowed}, got {value:g}")
+            raise WriteRejected(f"manual_pressure: allowed is {allowed}, got {value:g}")
         return value
 
 
@@ -248,7 +248,7 @@ def _signal(values: Mapping[str, float]) -> float:
     scaled = values.get("reference_scaled", math.nan) / SCALE
     reference = values.get("reference", scaled)
     if abs(reference - scaled) > 1 / SCALE:
-        raise WriteRejected(ExcCodes.ILLEGAL_VALUE, "reference and reference_scaled disagree in one request")
+        raise WriteRejected("reference and reference_scaled disagree in one request")
     return reference
 
 
@@ -266,8 +266,7 @@ def _getters(cycle: Cycle, travel: Travel, path: SignalPath) -> dict[str, Getter
     """Return, by register, what it serves of a snapshot."""
     getters = {
         **_command_getters(travel, path),
-        **_status_getters(cycle, travel),
-        **_travel_getters(travel, path),
+        **_status_getters(cycle, travel, path),
         **_estimate_getters(travel.stroke_m),
         **_statistics_getters(cycle),
         **_identity_getters(),
@@ -312,15 +311,7 @@ def _asked(travel: Travel, snapshot: Snapshot, requests: Requests) -> float:
     return travel.opening(requests.reference_m if requests.reference_writes > 0 else snapshot.decision.reference_m)
 
 
-def _travel_getters(travel: Travel, path: SignalPath) -> dict[str, Getter]:
-    return {
-        "reference_opening": lambda s, r: _asked(travel, s, r),
-        "position_signal": lambda s, _: path.signal(travel.opening(s.sample.position_m)),
-        "dead_band": lambda s, _: s.decision.dead_band_m / travel.stroke_m,
-    }
-
-
-def _status_getters(cycle: Cycle, travel: Travel) -> dict[str, Getter]:
+def _status_getters(cycle: Cycle, travel: Travel, path: SignalPath) -> dict[str, Getter]:
     return {
         "state": lambda s, _: s.decision.state,
         "fault": lambda s, _: s.decision.fault,
@@ -336,6 +327,9 @@ def _status_getters(cycle: Cycle, travel: Travel) -> dict[str, Getter]:
         "delta_r": lambda s, _: travel.opening_change(s.decision.delta_r_m),
         "sample_age": lambda s, _: s.decision.sample_age_s + cycle.since_s(s),
         "reference_in_force": lambda s, _: travel.opening(s.decision.reference_m),
+        "reference_opening": lambda s, r: _asked(travel, s, r),
+        "position_signal": lambda s, _: path.signal(travel.opening(s.sample.position_m)),
+        "dead_band": lambda s, _: s.decision.dead_band_m / travel.stroke_m,
         "emergency": lambda s, _: s.sample.emergency,
         "restored": lambda s, _: s.decision.restoration.trust,
         "restored_agreed": lambda s, _: s.decision.restoration.ups + s.decision.restoration.downs,
@@ -365,11 +359,7 @@ def _estimate_getters(stroke_m: float) -> dict[str, Getter]:
 
 def _estimate_getters_of(name: str, found: str, attribute: str) -> dict[str, Getter]:
     """Return the getters of an estimate that is an attribute of what a decision holds under `found`."""
-
-    def estimate(snapshot: Snapshot) -> Estimate:
-        one: Estimate = getattr(getattr(snapshot.decision, found), attribute)
-        return one
-
+    estimate = attrgetter(f"decision.{found}.{attribute}")
     return {
         f"{name}_e": lambda s, _: estimate(s).value,
         f"{name}_std": lambda s, _: estimate(s).std,
@@ -400,6 +390,7 @@ def _periods_within(statistics: CycleStatistics, bound: int) -> Getter:
 
 def _health_getters(cycle: Cycle, stroke_m: float) -> dict[str, Getter]:
     health = cycle.health or Health.idle(stroke_m)
+    operation = health.operation
     return {
         "health_baseline": lambda _s, _r: 0,
         "health_reset": lambda _s, _r: 0,
@@ -415,13 +406,6 @@ def _health_getters(cycle: Cycle, stroke_m: float) -> dict[str, Getter]:
         "reversals": lambda _s, _r: health.record.reversals,
         "stiction_index": lambda _s, _r: health.record.stiction_index,
         "moves_judged": lambda _s, _r: health.record.moves_judged,
-        **_operation_getters(health),
-    }
-
-
-def _operation_getters(health: Health) -> dict[str, Getter]:
-    operation = health.operation
-    return {
         "away_mean": lambda _s, _r: operation.today.away.value,
         "saturated": lambda _s, _r: operation.today.saturated_share,
         "course_deviation": lambda _s, _r: operation.today.course.value,

@@ -2,8 +2,6 @@
 
 from collections.abc import Callable, Mapping
 
-from pymodbus.constants import ExcCodes
-
 from config.alarm_advice import ADVICE
 from config.codes import AlarmState, Ne107Cause
 from positioner.control.requests import Requests
@@ -45,12 +43,11 @@ def require_alarm(values: Mapping[str, float], longest_s: float) -> None:
     for name in ("alarm_acknowledge", "alarm_shelve"):
         if name in values and values[name] not in ADVICE:
             allowed = ", ".join(str(int(each)) for each in ADVICE)
-            raise WriteRejected(ExcCodes.ILLEGAL_VALUE, f"{name}: allowed are {allowed}, got {values[name]:g}")
+            raise WriteRejected(f"{name}: allowed are {allowed}, got {values[name]:g}")
     if ("alarm_shelve" in values) != ("alarm_shelve_time" in values):
-        raise WriteRejected(ExcCodes.ILLEGAL_VALUE, "alarm_shelve: cause and time go in one request")
+        raise WriteRejected("alarm_shelve: cause and time go in one request")
     if values.get("alarm_shelve_time", 0.0) > longest_s:
         raise WriteRejected(
-            ExcCodes.ILLEGAL_VALUE,
             f"alarm_shelve_time: allowed is 0 to {longest_s:g} s ([alarms] shelve_limit_s), "
             f"got {values['alarm_shelve_time']:g}",
         )

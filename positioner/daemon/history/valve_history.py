@@ -90,9 +90,8 @@ class ValveHistory:
         before, self._was_locked = self._was_locked, self.locked()
         if before == self._was_locked:
             return None
-        if before:
-            return Happened(EventKind.LET_IN)
-        return Happened(EventKind.LOCKED_OUT, Ne107Status.FUNCTION_CHECK)
+        away = Happened(EventKind.LOCKED_OUT, Ne107Status.FUNCTION_CHECK)
+        return Happened(EventKind.LET_IN) if before else away
 
     def changes(self) -> list[Found]:
         """Return what has happened in the cycle since the last call. In the keeper's thread."""
