@@ -38,7 +38,7 @@ def run(arguments: argparse.Namespace) -> int:
 def _certificate(file: "DaemonFile", folder: Path) -> "Certificate | Refused":
     from positioner.control.laws.slides.certificate import Refused, certified, known_valve
     from positioner.control.laws.slides.slide_law import SlideSettings
-    from positioner.daemon.kept_alone import MEMORY, kept_path
+    from positioner.daemon.kept_alone import MEMORY, valve_file_path
     from positioner.daemon.memory.conditions import conditions_of
     from positioner.daemon.memory.memory_file import look_at
 
@@ -48,7 +48,7 @@ def _certificate(file: "DaemonFile", folder: Path) -> "Certificate | Refused":
         raise InputError("law.valve", "must not be given: only the straight law and its landings are bounded")
     if file.memory.folder is None:
         raise InputError("memory.folder", "is required: what is known of the valve is read there")
-    path = kept_path(folder / file.memory.folder, file.valve.name, MEMORY)
+    path = valve_file_path(folder / file.memory.folder, file.valve.name, MEMORY)
     with explain_failure(path, "cannot be read"):
         kept = look_at(path, file.valve.name, conditions_of(file))
     if kept.knowledge is None:

@@ -53,14 +53,16 @@ def _days(arguments: argparse.Namespace) -> "tuple[OperationDay, ...]":
     """Return the days that the daemon keeps; none without its file."""
     from config.daemon_file import load_daemon
     from positioner.daemon.health.health_file import kept_days
-    from positioner.daemon.kept_alone import HEALTH, kept_path
+    from positioner.daemon.kept_alone import HEALTH, valve_file_path
 
     if arguments.config is None:
         return ()
     file = load_daemon(arguments.config, arguments.valve)
     if file.health.folder is None:
         return ()
-    return kept_days(kept_path(arguments.config.parent / file.health.folder, file.valve.name, HEALTH), file.valve.name)
+    return kept_days(
+        valve_file_path(arguments.config.parent / file.health.folder, file.valve.name, HEALTH), file.valve.name
+    )
 
 
 def _print_day(day: "OperationDay") -> None:

@@ -12,7 +12,7 @@ from config.lock_file import take_lock
 HEALTH, MEMORY = "health", "memory"
 
 
-def kept_path(folder: Path, valve: str, what: str) -> Path:
+def valve_file_path(folder: Path, valve: str, what: str) -> Path:
     """Return the file in which a valve's HEALTH is kept, or the MEMORY of what is known of it."""
     return folder / f"{quote(valve, safe=' ')}.{what}.json"
 
@@ -29,7 +29,9 @@ def keep_alone(file: DaemonFile, beside: Path, on_exit: ExitStack) -> None:
         InputError: another daemon has them, or a folder cannot be made.
     """
     kept = ((file.health.folder, HEALTH), (file.memory.folder, MEMORY))
-    for path in (kept_path(beside / folder, file.valve.name, what) for folder, what in kept if folder is not None):
+    for path in (
+        valve_file_path(beside / folder, file.valve.name, what) for folder, what in kept if folder is not None
+    ):
         with explain_failure(path, "cannot be kept there"):
             path.parent.mkdir(parents=True, exist_ok=True)
             lock = take_lock(path.with_name(f"{path.name}.lock"), f"another daemon keeps {path.name} there")

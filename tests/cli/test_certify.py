@@ -8,7 +8,7 @@ import pytest
 from config.daemon_file import DaemonFile, load_valves
 from positioner.cli.main import main
 from positioner.control.valve_knowledge import ValveKnowledge
-from positioner.daemon.kept_alone import MEMORY, kept_path
+from positioner.daemon.kept_alone import MEMORY, valve_file_path
 from positioner.daemon.memory.conditions import conditions_of
 from positioner.daemon.memory.memory_file import write_memory
 from positioner.estimation.acceptance import Ratios
@@ -50,7 +50,7 @@ def keep(site: Path, knowledge: ValveKnowledge) -> None:
     assert isinstance(file, DaemonFile)
     assert file.memory.folder is not None
     (site.parent / "kept").mkdir()
-    write_memory(kept_path(site.parent / file.memory.folder, "v", MEMORY), "v", conditions_of(file), knowledge)
+    write_memory(valve_file_path(site.parent / file.memory.folder, "v", MEMORY), "v", conditions_of(file), knowledge)
 
 
 def test_a_valve_that_is_known_well_has_its_certificate(site: Path, capsys: pytest.CaptureFixture[str]) -> None:

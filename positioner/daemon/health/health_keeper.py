@@ -26,7 +26,7 @@ from positioner.daemon.health.health_file import (
 from positioner.daemon.health.ne107 import Ne107Condition, ne107_condition
 from positioner.daemon.health.valve_health import Health
 from positioner.daemon.keeping_thread import WRITE_EVERY_CHECKS
-from positioner.daemon.kept_alone import HEALTH, kept_path
+from positioner.daemon.kept_alone import HEALTH, valve_file_path
 from positioner.daemon.logs import log_event, logging_valve
 from positioner.daemon.snapshot import Snapshot
 
@@ -48,7 +48,7 @@ class StoredHealth:
         Raises:
             InputError: the file cannot be read or written.
         """
-        path = kept_path(folder, valve, HEALTH)
+        path = valve_file_path(folder, valve, HEALTH)
         with explain_failure(path, "the health record cannot be kept there"):
             folder.mkdir(parents=True, exist_ok=True)
             kept = read_record(path, valve, scales)

@@ -15,7 +15,7 @@ from config.errors import explain_failure
 from positioner.control.controller_memory import Decision
 from positioner.control.valve_knowledge import ValveKnowledge
 from positioner.daemon.keeping_thread import WRITE_EVERY_CHECKS
-from positioner.daemon.kept_alone import MEMORY, kept_path
+from positioner.daemon.kept_alone import MEMORY, valve_file_path
 from positioner.daemon.logs import log_event, logging_valve
 from positioner.daemon.memory.conditions import Conditions
 from positioner.daemon.memory.memory_file import Kept, read_memory, set_aside, write_memory
@@ -38,7 +38,7 @@ class StoredMemory:
         Raises:
             InputError: the folder cannot be made, the file not be read.
         """
-        path = kept_path(folder, valve, MEMORY)
+        path = valve_file_path(folder, valve, MEMORY)
         with explain_failure(path, "what is known cannot be kept there"):
             folder.mkdir(parents=True, exist_ok=True)
             return cls(path, conditions, read_memory(path, valve, conditions))

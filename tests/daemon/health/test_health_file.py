@@ -10,7 +10,7 @@ import pytest
 from config.errors import InputError
 from positioner.daemon.health import Health, HealthKeeper, HealthRecord, StoredHealth
 from positioner.daemon.health.health_file import KeptHealth, read_record, write_record
-from positioner.daemon.kept_alone import HEALTH, kept_path
+from positioner.daemon.kept_alone import HEALTH, valve_file_path
 from positioner.daemon.snapshot import Snapshot
 
 KEPT = HealthRecord(12.5, 340, 0.25, 17, 22e3)
@@ -65,7 +65,7 @@ def test_a_record_that_cannot_be_is_put_aside_and_told(tmp_path: Path, change: d
 def test_a_baseline_of_another_scale_is_dropped_and_told_and_the_counts_stay(
     tmp_path: Path, caplog: pytest.LogCaptureFixture
 ) -> None:
-    path = kept_path(tmp_path, "FV-1", HEALTH)
+    path = valve_file_path(tmp_path, "FV-1", HEALTH)
     write_record(path, "FV-1", KEPT, SCALES)
     stored = StoredHealth.in_folder(tmp_path, "FV-1", SCALES | {"device.map.command_pa.scale": "10.0"})
     assert stored.kept.record == replace(KEPT, baseline_pa=None)
