@@ -11,8 +11,9 @@ from dataclasses import dataclass
 from math import sqrt
 
 import numpy as np
+from numpy.typing import NDArray
 
-from config.recording import Recording
+from config.recording import Column, Recording
 from positioner.response.figure import Figure, no_value
 from positioner.tests_on_the_valve.thresholds import THRESHOLDS
 from signals.noise import quantum_m
@@ -47,19 +48,22 @@ class Breakout:
 
 def rest_before(recording: Recording) -> Rest | None:
     """Return the rest under the first command; None where there are too few samples of it."""
-    command = recording.command_pa
-    off = np.flatnonzero(np.abs(command - command[0]) > THRESHOLDS.command_changed * max(1.0, abs(float(command[0]))))
-    return _rest(recording, 0, int(off[0]) if off.size else len(command))
+    off = _off(recording.command_pa, 0)
+    return _rest(recording, 0, int(off[0]) if off.size else len(recording))
 
 
 def rest_after(recording: Recording) -> Rest | None:
     """Return the rest under the command that is held at the end."""
-    command = recording.command_pa
-    last = len(command)
-    off = np.flatnonzero(np.abs(command - command[-1]) > THRESHOLDS.command_changed * max(1.0, abs(float(command[-1]))))
+    off, last = _off(recording.command_pa, -1), len(recording)
     first = int(off[-1]) + 1 if off.size else 0
     # What is left of the slide back is no rest: its first half is left out.
     return _rest(recording, first + (last - first) // 2, last)
+
+
+def _off(command_pa: Column, row: int) -> NDArray[np.intp]:
+    """Return the rows whose command is another than that of a row."""
+    held_pa = float(command_pa[row])
+    return np.flatnonzero(np.abs(command_pa - held_pa) > THRESHOLDS.command_changed * max(1.0, abs(held_pa)))
 
 
 def tolerance_m(asked_m: float, rest: Rest) -> float:
@@ -70,17 +74,16 @@ def tolerance_m(asked_m: float, rest: Rest) -> float:
 def breakout(recording: Recording, rest: Rest, tolerance: float) -> Breakout | None:
     """Return where the stem broke loose; None where it did not."""
     off = recording.position_m - rest.position_m
-    for way in (1, -1):
-        beyond = way * off[rest.rows :] > tolerance
-        if len(beyond) < THRESHOLDS.in_a_row:
-            return None
-        runs = np.flatnonzero(np.convolve(beyond, np.ones(THRESHOLDS.in_a_row), "valid") >= THRESHOLDS.in_a_row)
-        if runs.size:
-            row = rest.rows + int(runs[0])
-            before, after = max(rest.rows - 1, row - 1), min(len(off) - 1, row + THRESHOLDS.in_a_row - 1)
-            spread = abs(float(recording.command_pa[after] - recording.command_pa[before]))
-            return Breakout(row, float(recording.time_s[row]), float(recording.command_pa[row]), spread, way)
-    return None
+    side = (off > tolerance).astype(int) - (off < -tolerance)
+    if len(side) < rest.rows + THRESHOLDS.in_a_row:
+        return None
+    runs = np.abs(np.convolve(side[rest.rows :], np.ones(THRESHOLDS.in_a_row), "valid")) >= THRESHOLDS.in_a_row
+    if not runs.any():
+        return None
+    row = rest.rows + int(np.argmax(runs))
+    before, after = max(rest.rows - 1, row - 1), min(len(off) - 1, row + THRESHOLDS.in_a_row - 1)
+    spread = abs(float(recording.command_pa[after] - recording.command_pa[before]))
+    return Breakout(row, float(recording.time_s[row]), float(recording.command_pa[row]), spread, int(side[row]))
 
 
 def farthest(recording: Recording, rest: Rest) -> Figure:

@@ -240,28 +240,22 @@ def _stroke_times(
     recording: Recording, sign: float, ends: tuple[float, float], noise_m: float
 ) -> tuple[Figure, Figure]:
     """Return the times from the change of the command until the stem is there, upwards and downwards, s."""
-    t, p, x = recording.time_s, recording.command_pa, sign * recording.position_m
-    low, high = ends
-    at_low = np.flatnonzero(p <= p.min() + 1e-6 * np.ptp(p))
-    at_high = np.flatnonzero(p >= p.max() - 1e-6 * np.ptp(p))
-    gap_s = float(np.median(np.diff(t)))
-    before_up = at_low[at_low < at_high[0]]
-    after = at_low[at_low > at_high[-1]]
-    if not before_up.size or not after.size:
+    t, p, (low, high) = recording.time_s, recording.command_pa, ends
+    near_pa, share = 1e-6 * float(np.ptp(p)), (sign * recording.position_m - low) / (high - low)
+    at_high = np.flatnonzero(p >= p.max() - near_pa)
+    before_up = np.flatnonzero(p[: at_high[0]] <= p.min() + near_pa)
+    if not before_up.size:
         lost = no_value("the command did not stay at its ends")
         return lost, lost
     level = min(THRESHOLDS.arrived, 1.0 - THRESHOLDS.arrived_sigmas * noise_m / (high - low))
 
-    def arrival(first: int, last: int, gone: Column) -> Figure:
-        there = np.flatnonzero(gone[first:last] >= level)
+    def arrival(first: int, gone: Column) -> Figure:
+        there = np.flatnonzero(gone[first:] >= level)
         if not there.size:
-            return no_value(f"longer than the {float(t[last - 1] - t[first]):.3g} s that were waited")
-        return Figure(float(t[first + int(there[0])] - t[first]), gap_s)
+            return no_value(f"longer than the {THRESHOLDS.stroke_held_s:.3g} s that were waited")
+        return Figure(float(t[first + int(there[0])] - t[first]), float(np.median(np.diff(t))))
 
-    share = (x - low) / (high - low)
-    up = arrival(int(before_up[-1]), int(at_high[-1]) + 1, share)
-    down = arrival(int(at_high[-1]), int(after[-1]) + 1, 1.0 - share)
-    return up, down
+    return arrival(int(before_up[-1]), share), arrival(int(at_high[-1]), 1.0 - share)
 
 
 def _leak(recording: Recording, sign: float, digit_m: float) -> Figure:

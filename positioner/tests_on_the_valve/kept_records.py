@@ -67,7 +67,7 @@ MEANS: Mapping[str, tuple[str, str]] = {
         "travel longer: a stop",
     ),
     "low_m": ("lower end lower: seat worn, or the reading's zero", "lower end higher: something lies on the seat"),
-    "lag_pa": ("less lag: another tubing or booster", "more lag: tubing or booster choked, air leaks"),
+    "lag_s": ("less lag: another tubing or booster", "more lag: tubing or booster choked, air leaks"),
     "opening_s": ("opens faster", "opens more slowly: supply, tubing, booster or friction"),
     "closing_s": ("closes faster", "closes more slowly: exhaust, booster, spring or friction"),
 }

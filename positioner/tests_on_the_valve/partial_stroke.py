@@ -101,15 +101,11 @@ def programme(
             f"allowed is beyond the command in force, {start_pa:g} Pa, up to the limit {limit_pa:g} Pa, "
             f"got {threshold_pa:g}",
         )
-    rate = bounds.rate_pa_per_s if asked.fast else (bounds.maximum_pa - bounds.minimum_pa) / THRESHOLDS.slowest_leg_s
-    spare_s = 2.0 * THRESHOLDS.rest_s
-    needed_s = abs(threshold_pa - start_pa) / rate + spare_s
-    if needed_s > bounds.longest_s:
-        rate = min(
-            bounds.rate_pa_per_s,
-            abs(threshold_pa - start_pa) / max(SHORTEST_S, THRESHOLDS.of_time_limit * bounds.longest_s - spare_s),
-        )
-    if abs(threshold_pa - start_pa) / rate + spare_s > bounds.longest_s:
+    way_pa, spare_s = abs(threshold_pa - start_pa), 2.0 * THRESHOLDS.rest_s
+    within_s = max(SHORTEST_S, THRESHOLDS.of_time_limit * bounds.longest_s - spare_s)
+    slow = (bounds.maximum_pa - bounds.minimum_pa) / THRESHOLDS.slowest_leg_s
+    rate = bounds.rate_pa_per_s if asked.fast else min(bounds.rate_pa_per_s, max(slow, way_pa / within_s))
+    if (needed_s := way_pa / rate + spare_s) > bounds.longest_s:
         raise InputError(source, f"experiment.limit_s: this test needs {needed_s:.3g} s, got {bounds.longest_s:g}")
     leaps = (Leap(start_pa, THRESHOLDS.rest_s), Leap(threshold_pa, 0.0))
     turn_m = asked.travel * stroke_m
@@ -141,18 +137,17 @@ def partial_stroke(
         verdict = broken_off or [ValveTestVerdict.UNDETERMINED]
         why = played.problem or "too few samples of the rest before it"
         return Outcome(TEST, valve, (), tuple(verdict), (why,))
-    tolerance = tolerance_m(asked.start * stroke_m, rest)
+    tolerance, after = tolerance_m(asked.start * stroke_m, rest), rest_after(recording)
     found = breakout(recording, rest, tolerance)
     travel = farthest(recording, rest)
-    quantities = _figures(recording, rest, found, travel, asked, stroke_m, played.state)
+    quantities = _figures(recording, rest, after, found, travel, asked, stroke_m, played.state)
     verdicts = [
         *broken_off,
-        *_verdicts(rest, found, travel, asked, stroke_m, tolerance, played.state, rest_after(recording)),
+        *_verdicts(rest, found, travel, asked, stroke_m, tolerance, played.state, after),
     ]
     notes = [f"broken off: {played.problem}"] if broken_off else []
     if tolerance > asked.start * stroke_m:
         notes.append(f"the noise makes {recording.kind.length.said(tolerance)} of the start tolerance")
-    after = rest_after(recording)
     if after is not None and not broken_off and abs(after.position_m - rest.position_m) > tolerance:
         notes.append("the stem is not quite where it was: friction holds it, and the law takes it back")
     if reference is None:
@@ -199,6 +194,7 @@ def _verdicts(
 def _figures(
     recording: Recording,
     rest: Rest,
+    after: Rest | None,
     found: Breakout | None,
     travel: Figure,
     asked: PartialStroke,
@@ -214,7 +210,6 @@ def _figures(
         out_pa = Figure(abs(found.command_pa - float(command_pa[begins])), found.plus_minus_pa)
         out_s = Figure(found.time_s - float(time_s[begins]), gap_s)
         within = _time_to(recording, rest, found, asked.travel * stroke_m, gap_s, state)
-    after = rest_after(recording)
     friction = _friction(recording, rest, after, state)
     unrested = no_value("broken off, or too few samples of the rest after it")
     off = unrested

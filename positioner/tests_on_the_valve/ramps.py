@@ -112,26 +112,26 @@ class Ramps:
 
     def at_no_rate(self, way: int, position_m: float) -> Figure:
         """Return the command at which the stem passes a position in one direction, without lag, Pa."""
-        rates, pressures, deviations = self._at(way, position_m)
-        if not rates:
-            return no_value(_no_line(way))
-        if max(rates) - min(rates) < THRESHOLDS.same_rate * max(rates):
+        lines = [each for each in self.lines if each.leg.way == way]
+        rates = [each.leg.rate_pa_per_s for each in lines]
+        if lines and max(rates) - min(rates) < THRESHOLDS.same_rate * max(rates):
             return no_value("ramps of one rate alone: lag would count as friction")
-        weights = 1.0 / deviations
-        matrix = np.column_stack([np.ones(len(rates)), rates]) * weights[:, None]
-        solved = np.linalg.lstsq(matrix, pressures * weights)[0]
-        covariance = np.linalg.inv(matrix.T @ matrix)
-        return Figure(float(solved[0]), THRESHOLDS.sigmas * hypot(sqrt(float(covariance[0, 0])), self._slip_pa(way)))
+        return self._at(way, position_m, lines, np.column_stack([np.ones(len(rates)), rates]))
 
     def at_slowest(self, way: int, position_m: float) -> Figure:
         """Return the same at the slowest rate that was played, lag and all, Pa."""
-        rates, pressures, deviations = self._at(way, position_m)
-        if not rates:
-            return no_value(_no_line(way))
-        slow = [n for n, rate in enumerate(rates) if rate < (1.0 + THRESHOLDS.same_rate) * min(rates)]
-        weights = 1.0 / deviations[slow] ** 2
-        mean = float(np.sum(weights * pressures[slow]) / np.sum(weights))
-        return Figure(mean, THRESHOLDS.sigmas * hypot(1.0 / sqrt(float(np.sum(weights))), self._slip_pa(way)))
+        lines = self.slowest(way)
+        return self._at(way, position_m, lines, np.ones((len(lines), 1)))
+
+    def _at(self, way: int, position_m: float, lines: Sequence[Line], matrix: Column) -> Figure:
+        """Return the first coefficient, by weighted least squares, of the commands at which lines pass a position."""
+        if not lines:
+            return no_value(f"no ramp {'up' if way > 0 else 'down'} has moved the stem along a line")
+        pressures, deviations = np.array([each.pressure_pa(position_m) for each in lines]).T
+        weights = 1.0 / np.hypot(deviations, [THRESHOLDS.held * each.held_pa for each in lines])
+        solved = np.linalg.lstsq(matrix * weights[:, None], pressures * weights)[0]
+        covariance = np.linalg.inv((matrix * weights[:, None] ** 2).T @ matrix)
+        return Figure(float(solved[0]), THRESHOLDS.sigmas * hypot(sqrt(float(covariance[0, 0])), self._slip_pa(way)))
 
     @property
     def rates_pa_per_s(self) -> tuple[float, ...]:
@@ -154,15 +154,6 @@ class Ramps:
         """Return by how much the lines of one direction are off for slips, Pa: all of them the same way."""
         return float(np.median([each.slip_pa for each in self.lines if each.leg.way == way]))
 
-    def _at(self, way: int, position_m: float) -> tuple[list[float], Column, Column]:
-        lines = [each for each in self.lines if each.leg.way == way]
-        told = [each.pressure_pa(position_m) for each in lines]
-        return (
-            [each.leg.rate_pa_per_s for each in lines],
-            np.array([pressure_pa for pressure_pa, _ in told]),
-            np.array([hypot(std, THRESHOLDS.held * each.held_pa) for (_, std), each in zip(told, lines, strict=True)]),
-        )
-
 
 def difference(one: Figure, other: Figure, share: float = 1.0) -> Figure:
     """Return a share of one less the other, or why there is none."""
@@ -174,17 +165,6 @@ def difference(one: Figure, other: Figure, share: float = 1.0) -> Figure:
 def scaled(figure: Figure, by: float) -> Figure:
     """Return a figure times a number, or why there is none."""
     return difference(figure, Figure(0.0, 0.0), by)
-
-
-def mean(one: Figure, other: Figure) -> Figure:
-    """Return the mean of two, or why there is none."""
-    if one.value is None or other.value is None:
-        return one if one.value is None else other
-    return Figure(0.5 * (one.value + other.value), 0.5 * hypot(one.plus_minus or 0.0, other.plus_minus or 0.0))
-
-
-def _no_line(way: int) -> str:
-    return f"no ramp {'up' if way > 0 else 'down'} has moved the stem along a line"
 
 
 def legs_of(recording: Recording) -> list[Leg]:

@@ -34,7 +34,7 @@ from config.results.block import Table
 from positioner.response.figure import Figure, no_value
 from positioner.tests_on_the_valve.outcome import Curve, Outcome, Picture, Quantity
 from positioner.tests_on_the_valve.program import Bounds, Leap, Program, ramped
-from positioner.tests_on_the_valve.ramps import Leg, Line, Ramps, difference, legs_of, mean, ramps_of, scaled
+from positioner.tests_on_the_valve.ramps import Leg, Line, Ramps, difference, legs_of, ramps_of, scaled
 from positioner.tests_on_the_valve.thresholds import THRESHOLDS
 
 LEGS = 4
@@ -185,11 +185,13 @@ def _half_apart(ramps: Ramps, half_m: float) -> tuple[Figure, Figure, Figure]:
 
 def _friction(ramps: Ramps, plate: Nameplate, x_0: float, x_1: float) -> list[Quantity]:
     still, slow, lag = _half_apart(ramps, 0.5 * (x_0 + x_1))
+    lag = replace(lag, plus_minus=still.plus_minus)
     return [
         Quantity("friction_pa", "friction at half travel, taken to no rate", "Pa", still),
         *_force("friction_n", "friction", "N", still, plate),
         Quantity("friction_at_rate_pa", "the same at the slowest rate, lag and all", "Pa", slow),
-        Quantity("lag_pa", "of it lag and viscous friction", "Pa", replace(lag, plus_minus=still.plus_minus)),
+        Quantity("lag_pa", "of it lag and viscous friction", "Pa", lag),
+        Quantity("lag_s", "the same over the rate, as a time", "s", scaled(lag, 1.0 / ramps.rates_pa_per_s[0])),
     ]
 
 
@@ -217,39 +219,30 @@ def _bench_set(ramps: Ramps, plate: Nameplate, x_0: float, x_1: float, least_pa:
 
 def _widened(figure: Figure, slope_pa_per_m: float, end: Figure) -> Figure:
     """Return a pressure at an end with what that is uncertain by."""
-    if figure.value is None:
-        return figure
-    by_end = slope_pa_per_m * (end.plus_minus or 0.0)
-    return Figure(figure.value, hypot(figure.plus_minus or 0.0, by_end))
+    return difference(figure, Figure(0.0, slope_pa_per_m * (end.plus_minus or 0.0)))
 
 
 def _together(up: Figure, down: Figure) -> Figure:
     """Return the mean of both directions; the end's own uncertainty, which they share, does not shrink."""
-    if up.value is None or down.value is None:
-        return mean(up, down)
-    return Figure(0.5 * (up.value + down.value), max(up.plus_minus or 0.0, down.plus_minus or 0.0))
+    middle = difference(up, scaled(down, -1.0), 0.5)
+    return (
+        middle
+        if middle.value is None
+        else replace(middle, plus_minus=max(up.plus_minus or 0.0, down.plus_minus or 0.0))
+    )
 
 
 def _bands(ramps: Ramps, x_0: float, x_1: float) -> list[Quantity]:
     still, _, _ = _half_apart(ramps, 0.5 * (x_0 + x_1))
     hysteresis = scaled(still, 2.0 / ((ramps.slope_pa_per_m.value or 1.0) * (x_1 - x_0)))
-    centres, up, down, error = _averaged(ramps, x_0, x_1)
-    few = no_value("too few samples of both directions at one command")
-    largest, average, linear = few, few, few
-    if len(centres):
-        band = (down - up) / (x_1 - x_0)
-        at = int(np.argmax(band))
-        largest = Figure(float(band[at]), THRESHOLDS.sigmas * sqrt(2.0) * float(error[at]) / (x_1 - x_0))
-        average = Figure(
-            float(np.mean(band)),
-            THRESHOLDS.sigmas * sqrt(2.0) * float(np.sqrt(np.mean(error**2) / len(band))) / (x_1 - x_0),
-        )
-        middle = 0.5 * (up + down)
-        off = middle - np.polyval(np.polyfit(centres, middle, 1), centres)
-        at = int(np.argmax(np.abs(off)))
-        linear = Figure(
-            float(abs(off[at])) / (x_1 - x_0), THRESHOLDS.sigmas * float(error[at]) / sqrt(2.0) / (x_1 - x_0)
-        )
+    largest = average = linear = no_value("too few samples of both directions at one command")
+    if (told := _averaged(ramps, x_0, x_1)) is not None:
+        centres, up, down, error = (each / (x_1 - x_0) for each in told)
+        band, middle, error = down - up, 0.5 * (up + down), THRESHOLDS.sigmas * error
+        off = np.abs(middle - np.polyval(np.polyfit(centres, middle, 1), centres))
+        largest = Figure(float(band.max()), sqrt(2.0) * float(error[np.argmax(band)]))
+        average = Figure(float(np.mean(band)), sqrt(2.0) * float(np.sqrt(np.mean(error**2) / len(band))))
+        linear = Figure(float(off.max()), float(error[np.argmax(off)]) / sqrt(2.0))
     return [
         Quantity("hysteresis", "hysteresis and dead band, of the span", "1", hysteresis),
         Quantity("dynamic_error_band", "dynamic error band at the slowest rate, largest", "1", largest),
@@ -258,22 +251,20 @@ def _bands(ramps: Ramps, x_0: float, x_1: float) -> list[Quantity]:
     ]
 
 
-def _averaged(ramps: Ramps, x_0: float, x_1: float) -> tuple[Column, Column, Column, Column]:
+def _averaged(ramps: Ramps, x_0: float, x_1: float) -> tuple[Column, Column, Column, Column] | None:
     """Return commands, mean positions up and down there at the slowest rate, m, and the mean's deviation, m."""
-    up, down = ramps.slowest(1), ramps.slowest(-1)
-    nothing = np.array([])
-    if not up or not down:
-        return nothing, nothing, nothing, nothing
-    first = max(each.pressure_pa(x_0 + THRESHOLDS.band_edge * (x_1 - x_0))[0] for each in (*up, *down))
-    last = min(each.pressure_pa(x_1 - THRESHOLDS.band_edge * (x_1 - x_0))[0] for each in (*up, *down))
-    if last <= first:
-        return nothing, nothing, nothing, nothing
+    ways = [ramps.slowest(way) for way in (1, -1)]
+    edge_m, lines = THRESHOLDS.band_edge * (x_1 - x_0), [*ways[0], *ways[1]]
+    first = max((each.pressure_pa(x_0 + edge_m)[0] for each in lines), default=0.0)
+    last = min((each.pressure_pa(x_1 - edge_m)[0] for each in lines), default=0.0)
+    if not all(ways) or last <= first:
+        return None
     edges = np.linspace(first, last, 11)
+    (up, up_error), (down, down_error) = (_in_bins(each, edges) for each in ways)
+    whole = np.isfinite(up) & np.isfinite(down)
+    error = np.hypot(up_error, down_error) / sqrt(2.0)
     centres = 0.5 * (edges[:-1] + edges[1:])
-    told = [_in_bins(lines, edges) for lines in (up, down)]
-    whole = np.isfinite(told[0][0]) & np.isfinite(told[1][0])
-    error = np.hypot(told[0][1], told[1][1]) / sqrt(2.0)
-    return centres[whole], told[0][0][whole], told[1][0][whole], error[whole]
+    return (centres[whole], up[whole], down[whole], error[whole]) if whole.any() else None
 
 
 def _in_bins(lines: list[Line], edges: Column) -> tuple[Column, Column]:
@@ -306,22 +297,18 @@ def _over_travel(ramps: Ramps, plate: Nameplate, x_0: float, x_1: float) -> Tabl
 
 def _friction_at(ramps: Ramps, middle_m: float, width_m: float, lag_pa: float) -> Figure:
     """Return the half distance of both directions about a position: of rows taken by the lines' commands."""
-    told: dict[int, tuple[float, float]] = {}
+    told = []
     for way in (1, -1):
-        means, variances = [], []
-        for line in ramps.slowest(way):
-            p, x = line.leg.command_pa, line.leg.position_m
-            low, high = (line.pressure_pa(middle_m + share * width_m)[0] for share in (-0.5, 0.5))
-            rows = (p >= low) & (p <= high)
-            if int(rows.sum()) >= THRESHOLDS.fewest_in_bin:
-                needed = p[rows] - (x[rows] - middle_m) / line.slope
-                means.append(float(np.mean(needed)))
-                variances.append(float(np.var(needed, ddof=1)) / int(rows.sum()))
-        if not means:
+        lines = ramps.slowest(way)
+        ends = [[each.pressure_pa(middle_m + share * width_m)[0] for each in lines] for share in (-0.5, 0.5)]
+        edges = np.array([float(np.mean(each)) if each else 0.0 for each in ends])
+        level, error = _in_bins(lines, edges) if lines else np.full((2, 1), np.nan)
+        if not np.isfinite(level[0]):
             return no_value("too few samples there")
-        told[way] = (float(np.mean(means)), sqrt(sum(variances)) / len(variances))
-    value = 0.5 * (told[1][0] - told[-1][0]) - lag_pa
-    return Figure(value, THRESHOLDS.sigmas * 0.5 * hypot(told[1][1], told[-1][1]))
+        slope = float(np.mean([each.slope for each in lines]))
+        told.append((float(np.mean(edges) - (level[0] - middle_m) / slope), float(error[0]) / slope))
+    (up_pa, up_error_pa), (down_pa, down_error_pa) = told
+    return Figure(0.5 * (up_pa - down_pa) - lag_pa, THRESHOLDS.sigmas * 0.5 * hypot(up_error_pa, down_error_pa))
 
 
 def _picture(ramps: Ramps, kind: Kind) -> Picture:

@@ -5,10 +5,12 @@ from collections.abc import Callable
 from dataclasses import replace
 from pathlib import Path
 
+import numpy as np
 import pytest
 
 from config.codes import ExperimentState, ValveTestVerdict
 from config.errors import InputError
+from config.recording import Recording
 from config.slave_file import Change, DeviceFault, Initial
 from positioner.control.settings import Settings
 from positioner.response.figure import Figure
@@ -127,6 +129,17 @@ def test_against_a_reference_friction_is_high_low_or_as_it_was(reference: Outcom
         (SLACK, V.FRICTION_LOW),
     ):
         assert outcome_of(VirtualValve(file, initial=WIDE_OPEN), reference=reference).verdicts == (verdict,)
+
+
+def test_a_stem_that_comes_back_beyond_where_it_was_has_broken_loose_on_its_way_out() -> None:
+    """Down by a tenth, and back above its rest: the break-out is the first motion, not the first one upwards."""
+    time_s = np.arange(0.0, 20.0, PERIOD_S)
+    command_pa = 60e3 - np.interp(time_s, [0.0, 2.0, 8.0, 14.0], [0.0, 0.0, 12e3, 0.0])
+    stem_m = 0.02 + np.interp(time_s, [0.0, 3.0, 8.0, 10.0, 14.0], [0.0, 0.0, -4.4e-3, -4.4e-3, 4e-4])
+    recording = Recording({"time_s": time_s, "command_pa": command_pa, "position_m": stem_m})
+    outcome = partial_stroke(Played(recording, ExperimentState.TURNED), ASKED, "FV-1", STROKE_M)
+    assert outcome.figure("breakout_s").value == pytest.approx(1.2, abs=0.4)
+    assert outcome.figure("stroke_s").value == pytest.approx(4.3, abs=0.3)
 
 
 def test_a_stem_that_creeps_before_the_test_is_told() -> None:

@@ -89,8 +89,11 @@ def test_lag_is_told_from_friction() -> None:
     rate = late.figure("friction_at_rate_pa").value, late.figure("friction_pa").value
     assert rate[0] is not None
     assert rate[1] is not None
-    slowest_pa_per_s = MAXIMUM_PA / 60.0
-    assert rate[0] - rate[1] == pytest.approx((0.3 + 0.5 * PERIOD_S) * slowest_pa_per_s, rel=0.1)
+    assert rate[0] - rate[1] == pytest.approx((0.3 + 0.5 * PERIOD_S) * MAXIMUM_PA / 60.0, rel=0.1)
+    faster = signature(recorded(lagging(SMOOTH, 0.3), bounds=replace(BOUNDS, longest_s=100.0)), PLATE)
+    (lag,) = (each for each in changes(faster, prompt) if each.quantity.name == "lag_s")
+    assert lag.quantity.figure.value == pytest.approx(0.3 + 0.5 * PERIOD_S, rel=0.1)
+    assert (lag.changed, "choked" in lag.means) == (True, True), "whatever the rates were"
     assert rate[1] == pytest.approx(prompt.figure("friction_pa").value, rel=0.015)
 
 
