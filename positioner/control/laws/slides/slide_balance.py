@@ -7,7 +7,6 @@
 Where friction grows over the travel its static part grows alike, so d_s goes as φ/κ.
 """
 
-from collections.abc import Sequence
 from dataclasses import dataclass, replace
 from functools import cached_property
 
@@ -87,21 +86,16 @@ class Balance(LocalBalance):
 
     def _first(self, direction: int, guess: Interval) -> Interval:
         """Return the shortest way that has landed in a direction, and the longest below it that held."""
-        slid = self._of(self.landings, direction)
+        slid, held = ([each for each in all_ if each.direction == direction] for all_ in (self.landings, self.held))
         slid_m = [self._in_the_middle_m(each, abs(each.position_m - each.from_m)) for each in slid]
         first = Interval(broke_m=min(slid_m) / (1.0 - self.swing), seen=True) if slid_m else guess
-        held_m = (
-            self._in_the_middle_m(each, self.ahead_m(each, self.swing)) for each in self._of(self.held, direction)
-        )
+        held_m = (self._in_the_middle_m(each, self.ahead_m(each, self.swing)) for each in held)
         seen_m = (each_m for each_m in held_m if VISIBLE * self.stroke_m < each_m < first.broke_m)
         return replace(first, held_m=max(seen_m, default=0.0))
 
     def _in_the_middle_m(self, each: SlideOutcome, way_m: float) -> float:
         """Return what a way, m, that slide began would be in the middle of the travel."""
         return way_m / self.local(each.from_m).on(each.direction)
-
-    def _of(self, slides: Sequence[SlideOutcome], direction: int) -> list[SlideOutcome]:
-        return [each for each in slides if each.direction == direction]
 
     def _shape_pa(self, position_m: float, direction: int) -> float:
         """Return B as it goes over the travel, Pa, without what only the last landings near a place say."""

@@ -38,11 +38,6 @@ class Move:
     held: bool = False
     """Whether one of it has held: then the next is as long as has surely broken loose."""
 
-    @property
-    def begun(self) -> bool:
-        """Whether a slide of it has been given."""
-        return self.given_s is not None
-
     def given(self, now_s: float, last: Slide | None) -> "Move":
         """Return it with one more slide."""
         return replace(self, left=self.left - 1, landed=self.landed + 1, given_s=now_s, last=last)

@@ -333,7 +333,7 @@ def _left_away(memory: SlideMemory, now: Now) -> bool:
     """Whether a slide of the move has left the stem away."""
     from_m = _standing_m(memory, now)
     back_m = now.plan(memory, from_m).back_m(_side(now))
-    return memory.move.begun and abs(now.reference_m - from_m) > 0.5 * back_m
+    return memory.move.given_s is not None and abs(now.reference_m - from_m) > 0.5 * back_m
 
 
 def _slide_from(memory: SlideMemory, from_m: float, to_m: float, direction: int) -> Slide:
