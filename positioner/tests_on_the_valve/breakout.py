@@ -68,7 +68,7 @@ def _off(command_pa: Column, row: int) -> NDArray[np.intp]:
 
 def tolerance_m(asked_m: float, rest: Rest) -> float:
     """Return the tolerance that is used: what was asked for, or what the noise needs."""
-    return max(asked_m, THRESHOLDS.tolerance_sigmas * rest.noise_m)
+    return max(asked_m, THRESHOLDS.moved_sigmas * rest.noise_m)
 
 
 def breakout(recording: Recording, rest: Rest, tolerance: float) -> Breakout | None:

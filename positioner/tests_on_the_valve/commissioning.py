@@ -327,9 +327,7 @@ def _proposals(outcome: Outcome, action: ActionWord, bounds: Bounds) -> list[Pro
     opens = action == "air_to_open"
     told = [
         Proposal("valve", "stroke_m", _rounded(travel.value, travel.plus_minus), "the travel from end to end"),
-        Proposal(
-            "valve", "action", action, f"the reading {'rises' if action == 'air_to_open' else 'falls'} with the command"
-        ),
+        Proposal("valve", "action", action, f"the reading {'rises' if opens else 'falls'} with the command"),
     ]
     if high.value is not None and low.value is not None and friction.value is not None:
         enough_pa = high.value + friction.value + THRESHOLDS.pressed * (high.value - low.value)
@@ -341,16 +339,10 @@ def _proposals(outcome: Outcome, action: ActionWord, bounds: Bounds) -> list[Pro
         # The law counts from the low end of the stem, where the reading of a valve may be off its zero.
         closed_m = outcome.figure("closed_m").value or 0.0
         at_zero_pa = low.value - (1.0 if opens else -1.0) * slope.value * closed_m
+        spring, held = _rounded(slope.value, slope.plus_minus), _rounded(friction.value, friction.plus_minus)
         told += [
-            Proposal(
-                "law",
-                "b_over_c_pa_per_m",
-                -_rounded(slope.value, slope.plus_minus),
-                "less the spring rate, as a pressure",
-            ),
-            Proposal(
-                "law", "k_over_c_pa", -_rounded(friction.value, friction.plus_minus), "less the friction, as a pressure"
-            ),
+            Proposal("law", "b_over_c_pa_per_m", -spring, "less the spring rate, as a pressure"),
+            Proposal("law", "k_over_c_pa", -held, "less the friction, as a pressure"),
             Proposal("law", "offset_pa", _rounded(at_zero_pa, low.plus_minus), "the bench set's lower end"),
         ]
     return told

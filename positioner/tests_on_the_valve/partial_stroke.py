@@ -253,31 +253,25 @@ def _friction(recording: Recording, rest: Rest, after: Rest | None, state: Exper
 def _against(now: dict[str, Figure], reference: Outcome, limits: tuple[float, float]) -> Iterator[ValveTestVerdict]:
     low, high = limits
     then = {each.name: each.figure for each in reference.quantities}
-    for name in _judged(now, then):
-        figure, was = now[name], then[name].value
-        assert figure.value is not None
-        assert was is not None
-        if high and figure.value - (figure.plus_minus or 0.0) > high * was:
+    friction = _both(now, then, "friction_at_rate_pa")
+    if friction is None and (command := _both(now, then, "command_pa")) is not None:
+        after, _, before = command
+        alike = abs(after - before) <= THRESHOLDS.same_command * max(abs(before), abs(after))
+        friction = _both(now, then, "breakout_pa") if alike else None
+    if friction is not None:
+        value, error, was = friction
+        if high and value - error > high * was:
             yield ValveTestVerdict.FRICTION_HIGH
-        if low and figure.value + (figure.plus_minus or 0.0) < low * was:
+        if low and value + error < low * was:
             yield ValveTestVerdict.FRICTION_LOW
-    figure, was = now["stroke_s"], then.get("stroke_s", no_value("")).value
-    if figure.value is not None and was and figure.value - (figure.plus_minus or 0.0) > THRESHOLDS.slow * was:
+    if (stroke := _both(now, then, "stroke_s")) is not None and stroke[0] - stroke[1] > THRESHOLDS.slow * stroke[2]:
         yield ValveTestVerdict.SLOW
 
 
-def _judged(now: dict[str, Figure], then: dict[str, Figure]) -> Iterator[str]:
-    """Yield by which figure friction is judged: none where no figure of both can be compared."""
-
-    def both(name: str) -> bool:
-        return bool(now[name].value is not None and name in then and then[name].value)
-
-    if both("friction_at_rate_pa"):
-        yield "friction_at_rate_pa"
-    elif both("breakout_pa") and both("command_pa"):
-        before, after = then["command_pa"].value or 0.0, now["command_pa"].value or 0.0
-        if abs(after - before) <= THRESHOLDS.same_command * max(abs(before), abs(after)):
-            yield "breakout_pa"
+def _both(now: dict[str, Figure], then: dict[str, Figure], name: str) -> tuple[float, float, float] | None:
+    """Return a figure, its +-, and what it was; None where it cannot be compared."""
+    figure, was = now[name], then.get(name, no_value("")).value
+    return (figure.value, figure.plus_minus or 0.0, was) if figure.value is not None and was else None
 
 
 def _picture(recording: Recording) -> Picture:

@@ -32,8 +32,6 @@ class Thresholds:
     """At rest before and after a test that breaks a stem loose."""
     in_a_row: int = 3
     """Samples beyond the tolerance that are a motion: two are noise more often than a stem."""
-    tolerance_sigmas: float = 5.0
-    """Deviations of the noise below which no tolerance is."""
     command_changed: float = 1e-4
     """Of the command: a change below it is none."""
 
@@ -61,7 +59,7 @@ class Thresholds:
     held: float = 0.1
     """Of how far the command goes from sample to sample: no line is better, for it is held between them."""
     moved_sigmas: float = 5.0
-    """Deviations of the noise beyond which a leg has moved the stem."""
+    """Deviations of the noise beyond which a stem has moved; no tolerance is below."""
 
     rate_ratio: float = 6.0
     """Of the fast rate to the slow one, q. A stem that sticks at the slow rate shows friction F_m, one that slides at
