@@ -109,7 +109,7 @@ def force(v: float, q: Parameters) -> float:
 @pytest.mark.long
 def test_a_parameter_that_would_have_to_be_negative_is_not_physical(tmp_path: Path) -> None:
     (tmp_path / "push.py").write_text(PUSH)
-    pushed = with_effect(BARE, str(tmp_path / "push.py"), push_ns2_per_m2=300.0)
+    pushed = with_effect(BARE, str(tmp_path / "push.py"), push_ns2_per_m2=1000.0)
     found = fit(record_of(pushed, 6, COUNT // 2), SEED, effects=("quadratic_drag",))
     drag = found.parameters["quadratic_drag.drag_ns2_per_m2"]
     assert (drag.at_bound, drag.physical) == (True, False)

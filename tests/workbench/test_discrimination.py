@@ -285,9 +285,8 @@ def words(fits: dict[str, Fit], recording: Recording, tmp_path: Path, monkeypatc
 
 @pytest.mark.long
 def test_the_command_tells_a_lag_from_a_dead_time(
-    words: list[str], tmp_path: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
+    words: list[str], tmp_path: Path, capsys: pytest.CaptureFixture[str]
 ) -> None:
-    monkeypatch.setattr("workbench.discriminate.experiment_design.TRIED", 4)
     out = tmp_path / "told"
     assert main(words) == 0
     said = capsys.readouterr().out

@@ -51,7 +51,7 @@ def test_stops_are_sought_where_the_positions_end() -> None:
 
 
 @pytest.mark.long
-def test_a_stop_that_the_stem_nowhere_comes_to_stays_where_it_is_declared() -> None:
+def test_a_stop_that_the_stem_nowhere_comes_to_may_be_anywhere_below() -> None:
     """Where the record happens to end a lower stop had been found, 95 %: 3.5 to 5.4 mm, and the law went no lower."""
     upper_m, lowest_m = 0.06, 0.02
     generator = np.random.default_rng(0)
@@ -61,9 +61,9 @@ def test_a_stop_that_the_stem_nowhere_comes_to_stays_where_it_is_declared() -> N
     assert float(recording.columns["position_m"].min()) > lowest_m
     found = fit(recording, VALVE, effects=("end_stop",)).parameters
     lower, travel = found["end_stop.lower_m"], found["end_stop.travel_m"]
-    assert lower.value == 0.0, "the seat, as the effect declares it"
+    assert lower.value < float(recording.columns["position_m"].min())
     assert lower.lower < -0.3e-3, "nothing excludes the truth, nor that there is none"
-    assert lowest_m < lower.upper < 1.1 * float(recording.columns["position_m"].min())
+    assert lower.upper > lowest_m
     assert lower.value + travel.value == pytest.approx(upper_m, abs=2.0 * NOISE_M)
 
 

@@ -99,7 +99,7 @@ def test_a_valve_by_a_pressure_of_another_unit_is_not_adequate_without_a_word() 
 @pytest.mark.long
 def test_nor_is_one_extended_without_a_word() -> None:
     found = extend(by_pressure(behind(0.1) + 101325.0), BARE, ["preload"], workers=1, from_pressure=True)
-    assert "but the measured pressure is off the command by 101 kPa, as absolute ones are" in found.summary()
+    assert "101 kPa" in found.summary()
 
 
 def asked(pressure_pa: Column) -> ByCommand | None:

@@ -15,7 +15,8 @@ from workbench.diagnosis.diagnosis_json import as_json
 from workbench.diagnosis.extension import extension_of
 from workbench.diagnosis.judged_landings import JudgedLandings
 from workbench.diagnosis.verdict import verdict
-from workbench.diagnosis.verdict_sentence import REPEAT, rivals_sentence, verdict_sentence
+from workbench.diagnosis.verdict_sentence import BREAKS_ELSEWHERE, REPEAT, rivals_sentence, verdict_sentence
+from workbench.fit.fit_result import Term
 from workbench.fit.fitted_parameter import Fitted
 from workbench.model.sampling import Motion, Sampling
 from workbench.select.effect_candidates import EffectStep, EvaluatedModel, judged_step
@@ -226,12 +227,20 @@ def test_a_residual_that_hangs_on_the_state_is_not_explained_by_reaching_the_flo
     assert diagnosed(parts, step(structured, ip_lag=structured)).verdict == "unexplained"
 
 
+def test_a_valve_that_breaks_loose_at_other_loads_is_not_explained_by_where_it_lands(parts: Split) -> None:
+    terms = replace(EXPLAINED.fit.terms, break_aways=Term(40.0, 9.0))
+    elsewhere = replace(EXPLAINED, fit=replace(EXPLAINED.fit, terms=terms))
+    found = diagnosed(parts, step(elsewhere, ip_lag=elsewhere))
+    assert found.verdict == "unexplained"
+    assert BREAKS_ELSEWHERE in found.sentence
+
+
 def test_searches_that_disagree_and_explain_nothing_are_not_trusted(parts: Split) -> None:
     lone = model_of(cost=20.0 * AT_FLOOR, error_m=20.0 * FLOOR_M, agreement=1)
     assert not lone.fit.trusted
     found = diagnosed(parts, step(lone, ip_lag=lone))
     assert found.verdict == "untrusted"
-    explained = replace(lone, errors=EXPLAINED.errors)
+    explained = replace(lone, fit=replace(lone.fit, terms=EXPLAINED.fit.terms), errors=EXPLAINED.errors)
     assert diagnosed(parts, step(explained, ip_lag=explained)).verdict == "adequate", "it explains all"
 
 

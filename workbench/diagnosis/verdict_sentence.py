@@ -22,6 +22,7 @@ NONE_ABOVE = 1.01
 SCATTERS = 3.0
 """Times the noise: a valve that repeats itself no better scatters."""
 OF_COMMAND = "the floor is the repeatability under the command; driven by the measured pressure, less may be left"
+BREAKS_ELSEWHERE = " The stem breaks loose at other loads than this model has."
 REPEAT = " To see whether the valve itself scatters so much, let the command repeat a stretch."
 
 
@@ -82,7 +83,8 @@ def _said(
         told = suspicion or any(each.physical and _tells(each) for each in steps[-1].candidates)
         lacked = "no effect here is proved to explain" if told else "the library does not have"
         said = f"Something is missing that {lacked}.{begun}"
-        return f"{said}{suspicion}{repeat}{_scatter(parts, length)}"
+        loose = BREAKS_ELSEWHERE if best.breaks_elsewhere else ""
+        return f"{said}{loose}{suspicion}{repeat}{_scatter(parts, length)}"
     return _unproved(verdict, best, steps, library, parts) + begun + (suspicion if verdict == "untrusted" else "")
 
 

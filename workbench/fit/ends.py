@@ -70,9 +70,12 @@ def search_about(like: Likelihood, end: End) -> End:
         if there.cost < end.cost + NATS:
             there = settle(like, there)
         ends.append(there)
-        vain = vain + 1 if there.cost > end.cost - PLACES.gain else 0
-        end = min(end, there, key=lambda each: each.cost)
-    return replace(end, as_likely=tuple(each for each in ends if end.cost < each.cost < end.cost + RISE_95))
+        if there.cost < end.cost - PLACES.gain:
+            end, vain = there, 0
+        else:
+            vain += 1
+    as_likely = tuple(each for each in ends if each is not end and each.cost < end.cost + RISE_95)
+    return replace(end, as_likely=as_likely)
 
 
 def _cheapest(like: Likelihood, end: End, generator: np.random.Generator) -> tuple[Vector, Vector]:

@@ -21,7 +21,7 @@ from workbench.compare.measures import fit_percent
 from workbench.data.noise_floor import say_m
 from workbench.data.record import Record, ready
 from workbench.fit.fitted_parameter import Fitted, draw_parameters, parameter_columns, parameter_table
-from workbench.fit.likelihood import Groups, Likelihood, Rows, soft, soft_weight
+from workbench.fit.likelihood import Groups, Likelihood, Rows, soft
 from workbench.fit.minimiser import End
 from workbench.fit.problem import Problem
 from workbench.fit.uncertainty import RISE_95, Combination, Uncertainty, uncertainty
@@ -37,7 +37,7 @@ AT_BOUND = 1e-3
 TRIED_STATIC = 13
 """Values of static friction in its interval: the free run is the same between the break-aways that each brings."""
 WANTS_OUT = 2.0
-"""Slope of the cost at the end, in deviations: the least lies beyond it."""
+"""Deviations from the end of a range to where the cost would be least: the record wants the parameter beyond it."""
 
 
 class Term(NamedTuple):
@@ -281,14 +281,10 @@ def _fitted(like: Likelihood, end: End, determined: Uncertainty, i: int) -> Fitt
     low, high = parameter.bounds
     near = AT_BOUND * (high - low)
     at_low, at_high = bool(z[i] < low + near), bool(z[i] > high - near)
-    r, weight = end.groups.whole, soft_weight(end.groups.whole, like.weights.soft)
-    column = end.jacobian[:, i]
-    slope, curvature = float(column @ (weight * r)), float(column**2 @ weight)
-    outward = slope if at_low else -slope if at_high else 0.0
-    wants_out = outward > WANTS_OUT * np.sqrt(max(curvature, 1e-300)) * np.sqrt(max(1.0, 2.0 * end.cost / like.count))
+    outward = -determined.off[i] if at_low else determined.off[i] if at_high else 0.0
     by_z = (value(z[i] + 1e-6) - value(z[i] - 1e-6)) / 2e-6
     lower = value(max(low, float(determined.lower[i]))) if np.isfinite(determined.lower[i]) else -np.inf
     upper = value(min(high, float(determined.upper[i]))) if np.isfinite(determined.upper[i]) else np.inf
     return Fitted(
-        value(z[i]), abs(by_z) * float(determined.std[i]), lower, upper, at_low or at_high, not bool(wants_out)
+        value(z[i]), abs(by_z) * float(determined.std[i]), lower, upper, at_low or at_high, bool(outward <= WANTS_OUT)
     )

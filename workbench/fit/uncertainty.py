@@ -79,6 +79,8 @@ class Uncertainty:
     upper: Vector
     condition: float
     undetermined: tuple[Combination, ...]
+    off: Vector
+    """Step to where the cost would be least, were no coordinate bounded, in deviations, (parameters,)."""
     root: Vector
     """(parameters, parameters): what times a step of the coordinates is as unlikely as so many deviations."""
 
@@ -94,6 +96,8 @@ class Curvature:
     condition: float
     std: Vector
     """Of the coordinates, (parameters,)."""
+    off: Vector
+    """Newton's step -C J' W r, in deviations, (parameters,): 0 but where a bound holds a coordinate."""
     reach: Vector
     """Half of the interval of 95 %, (parameters,); infinite where no residual hangs on a coordinate."""
 
@@ -119,8 +123,9 @@ def _curvature(like: Likelihood, end: End) -> Curvature:
     std = np.minimum(np.sqrt(variance), FARTHEST)[:count]
     reach = np.where(sandwich > np.diag(inverse), stdtrit(free, PROBABILITY), NORMAL_QUANTILE)[:count] * std
     reach[lengths[:count] == 0.0] = np.inf
+    off = -(inverse @ (scaled.T @ (weight * r)) / scale)[:count] / std
     by = np.outer(scale, scale)
-    return Curvature(H * by, inverse / by, float(np.sqrt(values[-1] / values[0])), std, reach)
+    return Curvature(H * by, inverse / by, float(np.sqrt(values[-1] / values[0])), std, off, reach)
 
 
 def uncertainty(like: Likelihood, end: End) -> Uncertainty:
@@ -139,7 +144,8 @@ def uncertainty(like: Likelihood, end: End) -> Uncertainty:
             lower[i], upper[i] = (min(lower[i], low), max(upper[i], high)) if determined else (low, high)
             std[i] = max(std[i] if determined else 0.0, 0.25 * (high - low))
     open_ones = _open_combinations(like, about.information[:count, :count])
-    return Uncertainty(std, lower, upper, about.condition, open_ones, _root(about.covariance[:count, :count], std))
+    root = _root(about.covariance[:count, :count], std)
+    return Uncertainty(std, lower, upper, about.condition, open_ones, about.off, root)
 
 
 def _root(covariance: Vector, std: Vector) -> Vector:

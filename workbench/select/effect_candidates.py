@@ -22,6 +22,8 @@ AT_END = 0.2
 """Of the weakest start: nearer to the end of its range a parameter is at it."""
 SAME_COST = 1.01
 """Factor on the cost within which two members of a class came out as the one they are."""
+MOST_BREAK_AWAY_SQUARES = 4.0
+"""Mean square of what break-aways are off by, in deviations: valves that are right leave 1.0."""
 
 
 @dataclass(frozen=True, slots=True, repr=False)
@@ -57,9 +59,17 @@ class EvaluatedModel(Brief):
         return not self.scatters and self.errors.structure * of_floor**2 > STRUCTURED
 
     @property
+    def breaks_elsewhere(self) -> bool:
+        """Whether the stem breaks loose at other loads than the model has, though it lands where that lands.
+
+        Within what a valve scatters it may.
+        """
+        return not self.scatters and self.fit.terms.break_aways.mean_square > MOST_BREAK_AWAY_SQUARES
+
+    @property
     def explained(self) -> bool:
         """Whether nothing is left in which an effect would be sought."""
-        return self.at_floor and not self.structured
+        return self.at_floor and not self.structured and not self.breaks_elsewhere
 
     @property
     def effects(self) -> tuple[str, ...]:
