@@ -116,10 +116,10 @@ def _commissioned(valve: Watching, name: str, bounds: Bounds, show: Callable[[st
         raise _Ended(ValveTestVerdict.NO_SPRING, found.notes[-1])
     travel, low, high = (found.figure(each) for each in ("travel_m", "low_m", "high_m"))
     if travel.value is None or low.value is None or high.value is None:
-        supply = ValveTestVerdict.NO_SUPPLY if high.value is None else ValveTestVerdict.UNDETERMINED
-        raise _Ended(
-            supply, f"{high.reason or low.reason}: more supply, or a lower [pressure] minimum_pa, may take it there"
+        limit = (
+            "a higher [pressure] maximum_pa, or more supply," if high.value is None else "a lower [pressure] minimum_pa"
         )
+        raise _Ended(ValveTestVerdict.UNDETERMINED, f"{high.reason or low.reason}: {limit} may take it there")
     bench = [found.figure(each) for each in ("bench_low_pa", "bench_high_pa")]
     friction = found.figure("friction_pa")
     ends = (low.value, high.value)
