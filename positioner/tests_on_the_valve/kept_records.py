@@ -109,7 +109,9 @@ class Change:
 
     @property
     def means(self) -> str:
-        """What it may mean; empty where nothing is known of it."""
+        """What it may mean; empty where nothing is known of it, or one of both is not."""
+        if self.deviations == 0.0:
+            return ""
         low, high = MEANS.get(self.quantity.name, ("", ""))
         return high if self.deviations > 0 else low
 

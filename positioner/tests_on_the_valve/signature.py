@@ -191,7 +191,7 @@ def _friction(ramps: Ramps, plate: Nameplate, x_0: float, x_1: float) -> list[Qu
         *_force("friction_n", "friction", "N", still, plate),
         Quantity("friction_at_rate_pa", "the same at the slowest rate, lag and all", "Pa", slow),
         Quantity("lag_pa", "of it lag and viscous friction", "Pa", lag),
-        Quantity("lag_s", "the same over the rate, as a time", "s", scaled(lag, 1.0 / ramps.rates_pa_per_s[0])),
+        Quantity("lag_s", "lag, over the rate: a time", "s", scaled(lag, 1.0 / ramps.rates_pa_per_s[0])),
     ]
 
 
