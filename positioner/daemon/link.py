@@ -120,7 +120,7 @@ class Link:
         driver: of the device.
         pace: says what time it is.
         settings: how the device is attended to.
-        doors: of all that connect anew; who finds its own closed tries with the next cycle. None: its own.
+        doors: of all that connect anew; who finds its own closed tries with the next cycle. None: nobody else does.
     """
 
     def __init__(
@@ -136,7 +136,7 @@ class Link:
         self._before_pa: float | None = None
         self._pace = pace
         self._settings = settings or LinkSettings()
-        self._doors = doors or Doors()
+        self._doors = doors
         self._lost_a_reply = False
         """Whether the device was there until its last reply was lost."""
         self._longest_unattended_s = self._settings.longest_unattended_s
@@ -197,12 +197,13 @@ class Link:
                 told_pa, self._told_pa = self._told_pa, None
                 reading = self._driver.read() if self._settings.shadow else self._driver.exchange(command_pa)
                 self._take(reading, command_pa, told_pa)
-            elif (self._unattended_s > 0 or self._backoff.may_try(now_s)) and self._door.acquire(blocking=False):
-                door, self._lost_a_reply = self._door, False
+            elif (self._unattended_s > 0 or self._backoff.may_try(now_s)) and self._enters(door := self._door):
+                self._lost_a_reply = False
                 try:
                     self._sample = self._found_again()
                 finally:
-                    door.release()
+                    if door is not None:
+                        door.release()
             else:
                 self._sample = self._lost()
         except DriverError as error:
@@ -295,9 +296,16 @@ class Link:
         self._driver.close()
 
     @property
-    def _door(self) -> Semaphore:
-        """Where it waits to connect."""
+    def _door(self) -> Semaphore | None:
+        """Where it waits to connect; None: nowhere."""
+        if self._doors is None:
+            return None
         return self._doors.lost_a_reply if self._lost_a_reply else self._doors.away
+
+    @staticmethod
+    def _enters(door: Semaphore | None) -> bool:
+        """Return whether a door lets it connect now."""
+        return door is None or door.acquire(blocking=False)
 
     def _notice_a_stall(self, now_s: float, command_pa: float) -> None:
         """Have a device that was left alone looked at before it is commanded; say so where this daemon stood still."""

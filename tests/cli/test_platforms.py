@@ -18,7 +18,7 @@ JUDGES = ROOT.parent / "shared" / "cases" / "exports" / "26-platform"
 WITHIN_S = 120.0
 ROOMS = ("config", "signals", "webpage", "sim", "workbench", "fieldbus", "drivers", "positioner", "northbound")
 OF_POSIX_ALONE = (
-    "daemon/ending",
+    "daemon/end_signals",
     "daemon/service.py",
     "daemon/assembled_valves.py",
     "daemon/workers.py",

@@ -2,7 +2,6 @@
 
 import os
 import select
-import tty
 from collections.abc import Iterator
 from contextlib import contextmanager, suppress
 from threading import Thread
@@ -17,6 +16,8 @@ def pseudo_line() -> Iterator[tuple[str, str]]:
     What is sent into one end comes out of the other, at once whatever the baud rate. Both ends stay there while the
     processes on them come and go.
     """
+    import tty  # Unix alone has it: elsewhere the commands beside this one load all the same
+
     ends = [os.openpty() for _ in range(2)]
     stop_read, stop_write = os.pipe()
     for controlling, end in ends:
