@@ -3,7 +3,7 @@
 The cost has edges, where a stem just sticks or just does not, and a descent may stay on one. An end is believed when
 descents from places drawn from what it leaves open come to nothing lower (iterated local search):
 
-    dz ~ N(0, S C),   do = -D^-1 C_o' dz      C as of `uncertainty`, S a little more than 1; onsets o follow their moves
+    dz ~ N(0, S^2 C),   do = -D^-1 C_o' dz      C as of `uncertainty`, S = `spread`; onsets o follow
 
 H = [A, C_o; C_o', D] by coordinates and onsets as of `minimiser`. Of each round's draws the cheapest is descended from.
 Ends that cost no more than 1.92 above the least belong to the interval of 95 %, however narrow the curvature there.
