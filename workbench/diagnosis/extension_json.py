@@ -18,10 +18,8 @@ def as_json(extension: Extension) -> dict[str, Any]:
             "train_rmse_m": extension.given_train_rmse_m,
             "test_rmse_m": extension.given_test_rmse_m,
         },
-        "refitted": errors_json(extension.refitted_errors)
-        | {"parameters": parameters_json(extension.refitted.parameters)},
-        "extended": errors_json(extension.extended_errors)
-        | {"parameters": parameters_json(extension.extended.parameters)},
+        "refitted": _fit(extension.refitted_errors, extension.refitted),
+        "extended": _fit(extension.extended_errors, extension.extended),
         "floor_m": extension.split.floor_m,
         **gain_json(extension.gain),
     }

@@ -15,7 +15,7 @@ import numpy as np
 
 from sim.karnopp import Vector
 from workbench.fit.likelihood import Likelihood, by_move, soft_weight
-from workbench.fit.minimiser import NO_SLOPE, End, descend
+from workbench.fit.minimiser import DAMPING, NO_SLOPE, End, descend
 from workbench.fit.onsets import SEARCH as ONSETS
 from workbench.fit.onsets import with_onsets
 from workbench.fit.uncertainty import RISE_95, uncertainty
@@ -35,8 +35,6 @@ class Places:
     """Of a round: one simulation each, as many as a descent of a few steps takes."""
     spread: float = 1.5
     """Deviations: the next valley lies beyond what this one leaves open, but not far."""
-    farthest: float = 0.3
-    """Of a coordinate, a logarithm mostly: where little is known a draw is not thrown about."""
     vain: int = 2
     """Rounds in a row that come to nothing lower, after which an end is believed."""
     rounds: int = 6
@@ -62,29 +60,32 @@ def settle(like: Likelihood, end: End) -> End:
 def search_about(like: Likelihood, end: End) -> End:
     """Search on from places that the record leaves open about an end, until none leads lower; with all as likely."""
     generator, vain, ends = np.random.default_rng(PLACES.seed), 0, [end]
+    root, follow = uncertainty(like, end).root, _onsets_by_z(like, end)
     for _ in range(PLACES.rounds):
         if vain == PLACES.vain or not end.z.size:
             break
-        z, onsets_s = _cheapest(like, end, generator)
+        z, onsets_s = _cheapest(like, end, root, follow, generator)
         there = descend(like, z, onsets_s)
         if there.cost < end.cost + NATS:
             there = settle(like, there)
         ends.append(there)
         if there.cost < end.cost - PLACES.gain:
             end, vain = there, 0
+            root, follow = uncertainty(like, end).root, _onsets_by_z(like, end)
         else:
             vain += 1
     as_likely = tuple(each for each in ends if each is not end and each.cost < end.cost + RISE_95)
     return replace(end, as_likely=as_likely)
 
 
-def _cheapest(like: Likelihood, end: End, generator: np.random.Generator) -> tuple[Vector, Vector]:
+def _cheapest(
+    like: Likelihood, end: End, root: Vector, follow: Vector, generator: np.random.Generator
+) -> tuple[Vector, Vector]:
     """Return the coordinates and onsets, s, of the cheapest of some places drawn about an end."""
-    root, ends = uncertainty(like, end).root, np.array([each.bounds for each in like.parameters])
+    ends = np.array([each.bounds for each in like.parameters])
     normal = generator.standard_normal((PLACES.draws, end.z.size))
-    steps = np.clip(PLACES.spread * np.linalg.lstsq(root, normal.T)[0].T, -PLACES.farthest, PLACES.farthest)
+    steps = np.clip(PLACES.spread * np.linalg.lstsq(root, normal.T)[0].T, -DAMPING.longest, DAMPING.longest)
     places = np.clip(end.z + steps, ends[:, 0], ends[:, 1])
-    follow = _onsets_by_z(like, end)
     earliest_s, latest_s = like.run.bounds_s(ONSETS.reach)
     onsets_s = [
         np.clip(end.onsets_s + like.run.period_s * np.clip(follow @ (z - end.z), -1.0, 1.0), earliest_s, latest_s)
