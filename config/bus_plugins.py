@@ -5,7 +5,7 @@ A package offers a bus by two entry points of the same name:
     positioner.devices    the schema of table `[device]`, a `config.device.Device` whose `bus` is that name
     positioner.drivers    what makes a driver (`drivers.boundary.Driver`) of such a table
 
-They are two, since reading a file needs no driver, and no driver's libraries. `docs/drivers.md` has an example.
+They are two, since reading a file needs no driver, and no driver's libraries. `docs/driver-package.md` has an example.
 """
 
 from importlib.metadata import EntryPoint

@@ -157,7 +157,7 @@ def _stands_for_none(position_m: Column) -> str | None:
             if high > low and min(abs(extreme - low), abs(extreme - high)) > FAR * (high - low):
                 return (
                     f"{count} positions are {extreme:.4g} m, all others {low:.4g} to {high:.4g} m: does this number "
-                    "stand for no value? Then leave these cells empty"
+                    "mean that there is no value? Then leave these cells empty"
                 )
     return None
 
@@ -192,7 +192,7 @@ def _of_pressure(command_pa: Column) -> Iterator[str]:
 def _of_constant(asked: _Asked) -> Iterator[str]:
     low, high = _ends(asked.values)
     if low == high:
-        yield f"the {asked.words} is {low:g} {asked.unit} throughout: a stem that is not driven says nothing"
+        yield f"the {asked.words} is {low:g} {asked.unit} throughout: nothing drives the stem"
 
 
 def _of_setpoint(position_m: Column, reference_m: Column) -> Iterator[str]:
@@ -202,12 +202,12 @@ def _of_setpoint(position_m: Column, reference_m: Column) -> Iterator[str]:
     if x.size < FEWEST_JUDGED_ROWS or np.ptp(r) == 0.0:
         return
     if np.array_equal(x, r):
-        yield "set point and position are one signal, to the last digit: which column is measured on the stem?"
+        yield "set point and position are equal to the last digit: which column is measured on the stem?"
         return
     changes_x, changes_r = (float((np.diff(each) != 0.0).mean()) for each in (x, r))
     if changes_x < SELDOM_SHARE and changes_r > OFTEN:
         changing = f"the set point changes in {100 * changes_r:.0f} % of the rows"
-        yield f"{changing}, the position in {100 * changes_x:.0f} %: do their columns stand in each other's place?"
+        yield f"{changing}, the position in {100 * changes_x:.0f} %: are the two columns swapped?"
     if not UNLIKE < np.ptp(x) / np.ptp(r) < 1.0 / UNLIKE:
         yield (
             f"positions go over {1e3 * np.ptp(x):.3g} mm and set points over {1e3 * np.ptp(r):.3g} mm: are both in the "
@@ -222,12 +222,12 @@ def _of_action(position_m: Column, asked: _Asked) -> Iterator[str]:
         return
     if asked.name == "reference_m":
         yield (
-            "the higher the set point, the lower the position: one of them counts from the other end; "
+            "the position falls as the set point rises: one of them counts from the other end; "
             "position_m=THEIRS:-% (or :-mm) counts from there"
         )
         return
     yield (
-        "more pressure, less position: air closes this valve, or the position counts from the other end. "
+        "the position falls as the pressure rises: air closes this valve, or the position counts from the other end. "
         "The model opens with pressure: position_m=THEIRS:-% (or :-mm) counts from there"
     )
 
@@ -247,7 +247,7 @@ def _of_registers(position_m: Column, kind: Kind) -> Iterator[str]:
         if others.size and float(others.max()) < (1.0 - JUMP_SHARE) * np.ptp(x):
             yield (
                 f"positions jump {jumps.size} times by nearly all of 65536 steps of {quantum:.3g} {kind.travel.si}: a "
-                "register of 16 bits read without its sign? Numbers from 32768 on are then less by 65536"
+                "register of 16 bits read without its sign? Then subtract 65536 from numbers above 32767"
             )
 
 
@@ -265,7 +265,7 @@ def _of_repeats(time_s: Column, position_m: Column, asked: Column | None) -> Ite
     if often > 1 and float((runs % often == 0).mean()) > STEADY_RUN_SHARE:
         period_s = often * float(np.median(np.diff(time_s)))
         yield (
-            f"the position changes every {often} rows alone: it is read every {period_s:.3g} s and written more often; "
+            f"the position changes only every {often} rows: it is read every {period_s:.3g} s and written more often; "
             "export the rows in which it was read"
         )
 
@@ -288,8 +288,8 @@ def _of_sampling(time_s: Column, position_m: Column, asked: _Asked) -> Iterator[
     period_s = float(np.median(np.diff(t)))
     if ahead := _count_early_answers(x, u):
         yield (
-            f"in {ahead[0]} of {ahead[1]} changes of the {asked.words} the stem had gone most of its way before: their "
-            "clocks differ, or one column was shifted against the other"
+            f"in {ahead[0]} of {ahead[1]} changes of the {asked.words} the stem had gone most of its way before the "
+            "change: the two clocks differ, or one column is shifted in time"
         )
         return
     told_when = np.diff(np.flatnonzero(whole)) > 1  # a row of the command's own between two of the stem's
@@ -299,9 +299,8 @@ def _of_sampling(time_s: Column, position_m: Column, asked: _Asked) -> Iterator[
     early, late = int(moves[rested].sum()), int((moves[rested] | moves[rested + 1]).sum())
     if rested.size >= 5 and early > RESPONDS_TOO_EARLY * rested.size:
         yield (
-            f"in {early} of {late} answers the stem had moved by the row of the {asked.words}'s change: snapshots, the "
-            f"{asked.words} changed between them. A row's {asked.words} is in force from its time: export changes with "
-            "their times"
+            f"in {early} of {late} changes the stem had moved by the row that first shows the new {asked.words}: the "
+            f"rows are snapshots. Export each change of the {asked.words} with its own time"
         )
     begins = np.flatnonzero(moves & ~np.append(False, moves[:-1]))
     ends = np.flatnonzero(moves & ~np.append(moves[1:], False))
@@ -340,7 +339,7 @@ def _of_lines(position_m: Column) -> Iterator[str]:
         and float((bends & moving).sum() / moving.sum()) > STRAIGHT_SHARE
         and x[1] != x[0]
     ):
-        yield "many positions lie on straight lines: the historian drew them between its samples; export raw samples"
+        yield "many positions lie on straight lines, as a historian interpolates; export raw samples"
 
 
 def _ends(column: Column) -> tuple[float, float]:

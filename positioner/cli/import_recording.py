@@ -53,7 +53,7 @@ def run(arguments: argparse.Namespace) -> int:
         print(f"look: {said}")
     if arguments.out is not None:
         recording.write(arguments.out)
-        print(f"{arguments.out}: {len(recording)} rows, to be read without --column")
+        print(f"{arguments.out}: {len(recording)} rows; this file needs no --column")
     return 0
 
 

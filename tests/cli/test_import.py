@@ -86,7 +86,7 @@ def test_the_words_that_import_proposes_lead_to_a_verdict(
     path = tmp_path / name
     write(path, measured)
     assert main(["import", str(path)]) == 0
-    proposed = re.search(r"proposed, look at it: (.*)", capsys.readouterr().out)
+    proposed = re.search(r"proposed, check it: (.*)", capsys.readouterr().out)
     assert proposed is not None
     words = [mended.get(word, word) for word in shlex.split(proposed[1])]
     out = tmp_path / "rec.csv"

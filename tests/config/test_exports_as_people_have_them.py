@@ -246,7 +246,7 @@ READ = {
     "a status column": Good(
         text(["t,PV,OUT,Q", *(f"{line},{'Bad' if i in (3, 4) else 'Good'}" for i, line in enumerate(rows()[1:]))]),
         options=ExportOptions(status=(Status("Q", ("Good",)),)),
-        said="rows not Good in Q, without values: 2",
+        said="rows that are not Good in Q, read without values: 2",
         missing=(3, 4),
     ),
     "a status of numbers": Good(
@@ -634,12 +634,12 @@ ODD = {
     "shares taken for %": (rows(pv=[f"{0.01 * x:.4f}" for x in PV]), "position_m=PV:%", "are they shares of 1"),
     "a valve that air closes": (rows(pv=[f"{100 - x:.2f}" for x in PV]), "position_m=PV:%", "air closes this valve"),
     "constant position": (rows(pv=["50.0"] * N), "position_m=PV:%", "a stem that never moves says nothing"),
-    "constant command": (rows(out=["0.6"] * N), "position_m=PV:%", "a stem that is not driven says nothing"),
+    "constant command": (rows(out=["0.6"] * N), "position_m=PV:%", "nothing drives the stem"),
     "five rows": (rows()[:6], "position_m=PV:%", "5 rows are too few"),
     "a number for no value": (
         rows(pv=["-9999" if i in (3, 4, 5) else f"{x:.2f}" for i, x in enumerate(PV)]),
         "position_m=PV:%",
-        "3 positions are -4 m, all others 0.0114. to 0.0285. m: does this number stand for no value?",
+        "3 positions are -4 m, all others 0.0114. to 0.0285. m: does this number mean that there is no value?",
     ),
     "the hour that summer time takes": (
         rows(time=[f"{t + 3600.0 * (t > 15.0):.1f}" for t in T]),

@@ -40,12 +40,12 @@ def test_a_sound_recording_is_left_alone() -> None:
         ),
         ({"position_m": 2.0 * answered(COMMAND)}, "of a stroke of 40 mm"),
         ({"position_m": 0.01 * answered(COMMAND)}, "positions never pass .* are they shares of 1"),
-        ({"position_m": 0.04 - answered(COMMAND)}, "more pressure, less position: air closes this valve"),
+        ({"position_m": 0.04 - answered(COMMAND)}, "the position falls as the pressure rises: air closes this valve"),
         ({"position_m": np.full(T.size, 0.01)}, "the position is 0.01 m throughout"),
         ({"command_pa": np.full(T.size, 5e4)}, "the command is 50000 Pa throughout"),
         ({"command_pa": 1e-5 * COMMAND}, "are they in bar, kPa or %"),
         ({"command_pa": 100.0 * COMMAND}, "commands go to .* bar: is the unit right"),
-        ({"position_m": answered(COMMAND, late=0)}, "the stem had moved by the row of the command's change: snapshots"),
+        ({"position_m": answered(COMMAND, late=0)}, "the rows are snapshots"),
         ({"position_m": answered(COMMAND, share=0.999)}, "most moves are over within two samples, 0.05 s apart"),
         ({"position_m": np.interp(T, T[::13], answered(COMMAND)[::13])}, "lie on straight lines"),
         ({"position_m": np.where(RNG.random(T.size) < 0.3, np.nan, answered(COMMAND))}, "% of position_m is missing"),
@@ -82,16 +82,16 @@ def test_a_sound_record_of_set_point_and_travel_is_left_alone() -> None:
     ("columns", "said"),
     [
         ({"reference_m": np.full(T.size, 0.02)}, "the set point is 0.02 m throughout"),
-        ({"position_m": 0.04 - TRAVEL}, "the higher the set point, the lower the position"),
-        ({"position_m": SETPOINT}, "set point and position are one signal, to the last digit"),
+        ({"position_m": 0.04 - TRAVEL}, "the position falls as the set point rises"),
+        ({"position_m": SETPOINT}, "set point and position are equal to the last digit"),
         (
             {"position_m": SETPOINT, "reference_m": TRAVEL},
-            "the set point changes in 100 % of the rows, .* do their columns stand in each other's place",
+            "the set point changes in 100 % of the rows, .* are the two columns swapped",
         ),
         ({"position_m": 0.01 * TRAVEL}, "are both in the same unit, a share of 1, % or mm"),
         ({"position_m": np.interp(T, T[::13], TRAVEL[::13])}, "lie on straight lines"),
         ({"position_m": np.roll(TRAVEL, -6)}, "changes of the set point the stem had gone most of its way before"),
-        ({"position_m": np.repeat(TRAVEL[::5], 5)}, "the position changes every 5 rows alone: it is read every 0.25 s"),
+        ({"position_m": np.repeat(TRAVEL[::5], 5)}, "the position changes only every 5 rows: it is read every 0.25 s"),
     ],
 )
 def test_what_is_odd_of_set_point_and_travel_is_said(columns: dict[str, Column], said: str) -> None:
@@ -116,7 +116,7 @@ def test_a_register_read_without_its_sign_is_said() -> None:
 def test_a_drive_that_is_never_driven_is_said() -> None:
     told = {KIND: next(each for each in KINDS if each != "valve")}
     still = Recording({"time_s": T, "command_pa": np.zeros(T.size), "position_m": TRAVEL}, told)
-    assert any("throughout: a stem that is not driven says nothing" in each for each in oddities(still))
+    assert any("throughout: nothing drives the stem" in each for each in oddities(still))
 
 
 def test_a_coarse_sensor_of_a_stem_that_steps_as_it_is_asked_is_no_slow_reading() -> None:

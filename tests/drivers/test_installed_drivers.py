@@ -1,4 +1,4 @@
-"""Drivers are found by the name of their bus: the package of `docs/drivers.md`, installed as a site would have it."""
+"""Drivers are found by the name of their bus: the package of `docs/driver-package.md`, as a site installs it."""
 
 import os
 import re
@@ -18,11 +18,11 @@ from config.entry_points import find_offers
 from config.errors import InputError
 from drivers import driver_for
 
-GUIDE = Path(__file__).parents[2] / "docs" / "drivers.md"
+GUIDE = "".join((Path(__file__).parents[2] / "docs" / name).read_text() for name in ("driver-package.md", "drivers.md"))
 
 
 def blocks(language: str) -> list[str]:
-    return re.findall(rf"```{language}\n(.*?)```", GUIDE.read_text(), re.DOTALL)
+    return re.findall(rf"```{language}\n(.*?)```", GUIDE, re.DOTALL)
 
 
 def install(folder: Path, entries: dict[str, dict[str, str]], name: str = "acme-positioner") -> None:

@@ -7,6 +7,16 @@ from pathlib import Path
 
 PAGE = Path(__file__).parents[2] / "docs" / "pytest.md"
 BLOCK = re.compile(r"^```python ([\w/.]+)\n(.*?)^```", re.MULTILINE | re.DOTALL)
+REAL_TIME = """
+import pytest
+
+
+@pytest.mark.parametrize("valve_slave", [{"clock": {"mode": "real_time"}}], indirect=True)
+def test_in_real_time_the_valve_goes_on_by_itself(valve_slave):
+    first = valve_slave.read().device_time_s
+    while valve_slave.read().device_time_s < first + 0.1:
+        pass
+"""
 WRONG = """
 import pytest
 
@@ -28,6 +38,7 @@ def test_the_example_project_passes_beside_its_own_config(tmp_path: Path) -> Non
         (tmp_path / file).parent.mkdir(exist_ok=True)
         (tmp_path / file).write_text(text, encoding="utf-8")
     assert (tmp_path / "config" / "__init__.py").is_file()
+    (tmp_path / "test_real_time.py").write_text(REAL_TIME)
     done = run_pytest(tmp_path)
     assert done.returncode == 0, done.stdout + done.stderr
     assert "6 passed" in done.stdout

@@ -58,9 +58,9 @@ class ExportPreview:
         proposed = " ".join(map(quote_word, self.words))
         return [
             f"{self.what}; {self.header}",
-            Table(("column", "unit", "first", "values", ""), rows),
+            Table(("column", "unit", "row 1", "row 2", "row 3"), rows),
             *self.open,
-            f"proposed, look at it: {proposed}" if proposed else "nothing is proposed",
+            f"proposed, check it: {proposed}" if proposed else "nothing is proposed",
         ]
 
 

@@ -155,7 +155,9 @@ def _good(path: Path, part: Samples, options: ExportOptions, metadata: dict[str,
                 str(path),
                 f"no row's {status.theirs!r} is {' or '.join(status.good)}; it holds: {holds}; say which are good",
             )
-        metadata[f"rows not {'/'.join(status.good)} in {status.theirs}, without values"] = str(int((~here).sum()))
+        metadata[f"rows that are not {'/'.join(status.good)} in {status.theirs}, read without values"] = str(
+            int((~here).sum())
+        )
         good &= here
     return good
 

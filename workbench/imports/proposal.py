@@ -165,10 +165,10 @@ def _doubts(left: Sequence[ColumnPreview]) -> Iterator[str]:
     for each in left:
         if held := each.status_words:
             (often, _), *_ = Counter(cell for cell in each.cells if cell != "").most_common()
-            keeps = f"--status {quote_word(f'{each.name}={often}')} keeps the rows of that word alone"
-            yield f"{each.name!r} holds {held}: {keeps}, if it is the good one"
+            keeps = f"--status {quote_word(f'{each.name}={often}')} keeps only rows with {often}, if that means good"
+            yield f"{each.name!r} holds {held}: {keeps}"
         if held := each.opc_qualities:
-            yield f"{each.name!r} holds {held}: of OPC's qualities {GOOD} is good, the rows of it alone are kept"
+            yield f"{each.name!r} holds {held}: of OPC's qualities {GOOD} means good; only its rows are kept"
 
 
 def _whole_clock(clock: ColumnPreview, left: list[ColumnPreview]) -> ColumnPreview:
