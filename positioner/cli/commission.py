@@ -101,13 +101,15 @@ def _write_proposals(
     """Show what is proposed, ask, and write it; 0 if it was written."""
     from config.daemon_file import load_daemon
 
-    by_valve = file.law is not None and file.law.valve is not None
-    told = [each for each in proposals if not (by_valve and each.table == "law")]
+    stays = {}
+    if file.law is not None and file.law.valve is not None:
+        stays["law"] = "[law] stays: it names a valve file"
+    if "maximum_pa" in file.pressure.model_fields_set:
+        stays["pressure"] = f"pressure.maximum_pa = {file.pressure.maximum_pa:.6g} stays: it is as somebody wrote it"
+    told = [each for each in proposals if each.table not in stays]
     print(f"\nfor {path}:")
-    for each in told:
-        print(f"  {each.line}")
-    if by_valve:
-        print("  [law] stays: it names a valve file")
+    for line in (*(each.line for each in told), *stays.values()):
+        print(f"  {line}")
     before = path.read_text(encoding="utf-8")
     after = with_values(before, {(each.table, each.key): each.value for each in told}, str(path))
     if not _agreed(f"write these into {path}", arguments):

@@ -16,7 +16,9 @@ Where no stem rests is where a valve that has been identified needs no more (`re
 
 otherwise, for by hand the stem may be anywhere in its band, |u - u_0| > p_high - p_low, u_0 when x last changed; and
 where nothing is known, half of what the pressure limits allow. The time for which that holds adds up as long as x is
-the same, for a law pushes one way and the other: to the delay, and to five times as long as the stem takes to answer.
+the same, for a law pushes one way and the other: to the delay, and to five times as long as the stem takes to answer
+and the samples that tell a law that a push was in vain. For what the valve needs is known of the valve as identified:
+one whose spring was changed since rests elsewhere, and comes by the next push, which is greater.
 """
 
 from collections.abc import Callable
@@ -38,6 +40,8 @@ ACTUATOR = 0.5
 """Of the pressures under which the stem rests: one measured so near the command in force is that of the actuator."""
 ANSWERS, UNKNOWN_S = 5.0, 1.0
 """Times as long as the stem takes to answer; where that is not known yet, s."""
+IN_VAIN = 8
+"""Samples that tell a rest (`stem_at_rest`), and with it that a push was in vain."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -224,7 +228,7 @@ def after_cycle(
         rests = _rests(frozen, settings, needed, position_m, command_pa=command_pa, pressure_pa=pressure_pa)
         frozen = frozen._replace(
             unanswered_s=frozen.unanswered_s + (0.0 if rests else passed_s),
-            longest_s=max(settings.frozen_s, ANSWERS * needed.answers_s or UNKNOWN_S),
+            longest_s=max(settings.frozen_s, (ANSWERS * needed.answers_s or UNKNOWN_S) + IN_VAIN * passed_s),
             band=needed.band,
         )
     conditions = (

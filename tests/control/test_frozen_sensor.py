@@ -126,3 +126,26 @@ def test_a_stem_that_moves_as_it_is_told_is_never_frozen_though_it_is_read_by_fe
     loop = VirtualLoop(file, plant)
     run_to_the_fault(loop, lambda _at_s: None, lambda: plant.stem_pu)
     assert loop.decision.fault is Fault.NONE
+
+
+def test_a_valve_whose_spring_was_changed_is_not_frozen() -> None:
+    """It rests where the law, which knows the spring before, says that none does; and comes by the next push."""
+    file = DaemonFile.model_validate(
+        {
+            "valve": {"stroke_m": 0.04},
+            "cycle": {"pace": "device", "period_s": 0.05},
+            "pressure": {"maximum_pa": 140e3},
+            "safety": {"stale_after_s": 0.5},
+            "law": {"b_over_c_pa_per_m": -1.5e6, "k_over_c_pa": -2595.0, "offset_pa": 20.3e3},
+        }
+    )
+    table = load_slave(SHIPPED / "profiles" / "slave_ordinary.toml")
+    clock, still = SlaveClock(mode="lockstep", period_s=0.05), table.sensor.model_copy(update={"noise_std_m": 0.0})
+    table = table.model_copy(update={"clock": clock, "sensor": still})
+    model = Valve.from_file(load_valve(shipped_valve("ordinary")), step_s=FINE_STEP_S)
+    model.rest_at(0.02, 60e3)
+    loop = VirtualLoop(file, Device(model, table, {}))
+    loop.cycles(0.2)
+    for reference in (0.5, 0.2, 0.8):
+        loop.refer_to(reference, 10.0)
+        assert (loop.decision.fault, model.position_m / 0.04) == (Fault.NONE, pytest.approx(reference, abs=0.01))

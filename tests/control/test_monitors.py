@@ -10,7 +10,7 @@ from config.errors import InputError
 from config.loading import validate
 from config.quantities import DeviceStatus
 from positioner.control.controller_memory import Decision
-from positioner.control.monitors import UNKNOWN_S, MonitorMemory, MonitorSettings, after_cycle, needs_of
+from positioner.control.monitors import IN_VAIN, UNKNOWN_S, MonitorMemory, MonitorSettings, after_cycle, needs_of
 from positioner.control.rest_band import RestBand
 from positioner.estimation.acceptance import Ratios
 from tests.control.test_controller import LAW, STROKE_M, Bench, automatic
@@ -29,7 +29,7 @@ def is_frozen(bench: Bench) -> Decision:
     bench.ask(mode=Mode.MANUAL, manual_pa=40e3)
     bench.step()
     bench.ask(manual_pa=300e3)
-    return [bench.step() for _ in range(round(100 * UNKNOWN_S) + 3)][-1]
+    return [bench.step() for _ in range(round(100 * UNKNOWN_S) + IN_VAIN + 3)][-1]
 
 
 def jumps(bench: Bench) -> Decision:

@@ -1,5 +1,6 @@
 """Commissioning of a valve that nobody has described, in virtual time; and the file that it writes."""
 
+from argparse import Namespace
 from collections.abc import Iterator
 from contextlib import contextmanager
 from pathlib import Path
@@ -16,13 +17,14 @@ from config.slave_file import DeviceFault, Initial
 from config.toml_text import with_values
 from config.travel import ActionWord
 from config.valve_file import EffectTable
+from positioner.cli.commission import _write_proposals
 from positioner.cli.main import main
 from positioner.cli.parts.own_valve import unknown_travel
 from positioner.control.played_experiment import ROUNDING
 from positioner.control.settings import Settings
 from positioner.response.figure import Figure, no_value
 from positioner.tests_on_the_valve.air_rates import air_rates
-from positioner.tests_on_the_valve.commissioning import Commissioned, commission, of_one_that_sticks
+from positioner.tests_on_the_valve.commissioning import Commissioned, Proposal, commission, of_one_that_sticks
 from positioner.tests_on_the_valve.small_steps import SmallSteps, programme, small_steps
 from tests.control.virtual_loop import VirtualLoop
 from tests.tests_on_the_valve.virtual_valve import (
@@ -95,6 +97,7 @@ def test_a_valve_that_nobody_has_described_runs_after_it(
     file = load_daemon(site)
     assert file.valve.stroke_m == pytest.approx(STROKE_M, rel=5e-3)
     assert file.valve.action == action
+    assert file.pressure.maximum_pa == MAXIMUM_PA, "the regulator's: a mended valve may need more than this one"
     assert file.law is not None
     assert file.law.b_over_c_pa_per_m == pytest.approx(-SLOPE, rel=0.01)
     low_pa = (PRELOAD_N + 0.12 * 207.5) / AREA_M2
@@ -116,6 +119,15 @@ def test_where_nobody_agrees_nothing_is_moved_nor_written(
         assert "nothing was moved" in capsys.readouterr().out
         assert stranger.device.samples == 3 + 1  # those of its own start
     assert site.read_text() == SITE
+
+
+def test_a_greatest_pressure_is_written_where_nobody_has(tmp_path: Path) -> None:
+    proposed = (Proposal("pressure", "maximum_pa", 116e3, "enough"),)
+    for text, expected in ((SITE, MAXIMUM_PA), (SITE.replace("maximum_pa", "minimum_pa = 0.0 #"), 116e3)):
+        site = tmp_path / "site.toml"
+        site.write_text(text.replace("[valve]", "[valve]\nstroke_m = 0.04"))
+        assert _write_proposals(site, load_daemon(site), proposed, Namespace(yes=True, name=None)) == 0
+        assert load_daemon(site).pressure.maximum_pa == expected
 
 
 def stuck() -> Commissioned:
