@@ -13,11 +13,9 @@ MOST_PORT = 65535  # 16 bits
 
 def add_listening(parser: argparse.ArgumentParser, port: int | None = None) -> None:
     """Declare where it listens; without a port of its own, at one that is free."""
-    parser.add_argument(
-        "--listen-host", default="127.0.0.1", help="address to listen on (127.0.0.1, this machine alone)"
-    )
-    said = "8765, or a free one" if port is None else str(port)
-    parser.add_argument("--listen-port", type=int, default=port, metavar="N", help=f"port to listen on ({said})")
+    parser.add_argument("--listen-host", default="127.0.0.1", help="address to listen on; this machine alone")
+    free = " (8765, or a free one)" if port is None else ""
+    parser.add_argument("--listen-port", type=int, default=port, metavar="N", help=f"port to listen on{free}")
 
 
 def listening(arguments: argparse.Namespace) -> "Listening":

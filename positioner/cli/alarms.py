@@ -20,7 +20,7 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
     what.add_argument("--acknowledge", metavar="ALARM", help="acknowledge this alarm, or all")
     what.add_argument("--shelve", metavar="ALARM", help="shelve this alarm for --minutes")
     what.add_argument("--unshelve", metavar="ALARM", help="end its shelving")
-    parser.add_argument("--minutes", type=float, default=60.0, metavar="N", help="time of shelving (60)")
+    parser.add_argument("--minutes", type=float, default=60.0, metavar="N", help="time of shelving")
     parser.add_argument("--json", action="store_true", help="print one JSON object")
     add_connection(parser)
 

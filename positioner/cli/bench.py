@@ -14,12 +14,12 @@ RESULTS = "results.csv"
 def add_arguments(parser: argparse.ArgumentParser) -> None:
     """Declare the command line."""
     parser.add_argument("folder", type=Path, metavar="DIR", help="folder of the cases; made if it is empty")
-    parser.add_argument("--drawn", type=int, default=300, metavar="N", help="number of simulated loops (300)")
+    parser.add_argument("--drawn", type=int, default=300, metavar="N", help="number of simulated loops")
     parser.add_argument(
-        "--effects", type=int, default=0, metavar="N", help="number of hidden effects, half a minute each (0)"
+        "--effects", type=int, default=0, metavar="N", help="number of hidden effects, half a minute each"
     )
     parser.add_argument(
-        "--first-seed", type=int, default=4000, metavar="SEED", help="first seed of the simulated cases (4000)"
+        "--first-seed", type=int, default=4000, metavar="SEED", help="first seed of the simulated cases"
     )
     parser.add_argument(
         "--labelled", type=Path, metavar="DIR", help="measured loops of others: labels.csv and its files"

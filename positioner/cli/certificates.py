@@ -23,7 +23,7 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
         metavar="NAME",
         help=f"host name or address of device or daemon ({', '.join(HERE)})",
     )
-    parser.add_argument("--days", type=_days, default=365, help="days of validity (365)")
+    parser.add_argument("--days", type=_days, default=365, help="days of validity")
 
 
 def run(arguments: argparse.Namespace) -> int:

@@ -12,19 +12,11 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
     """Declare the command line."""
     add_test_arguments(parser, recordings=False)
     parser.add_argument(
-        "--start",
-        type=float,
-        default=0.003,
-        metavar="SHARE",
-        help="travel that ends the creep, share of the stroke (0.003)",
+        "--start", type=float, default=0.003, metavar="SHARE", help="travel that ends the creep, share of the stroke"
     )
-    parser.add_argument("--most", type=float, default=0.02, metavar="SHARE", help="travel that stops the test (0.02)")
+    parser.add_argument("--most", type=float, default=0.02, metavar="SHARE", help="travel that stops the test")
     parser.add_argument(
-        "--rate",
-        type=float,
-        default=5e-4,
-        metavar="PER_S",
-        help="rate of the command, share of its range a second (0.0005)",
+        "--rate", type=float, default=5e-4, metavar="PER_S", help="rate of the command, share of its range a second"
     )
 
 

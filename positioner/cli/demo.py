@@ -196,7 +196,7 @@ class DemoOutcome:
 
 def add_arguments(parser: argparse.ArgumentParser) -> None:
     """Declare the command line."""
-    parser.add_argument("--bus", choices=tuple(BUSES), default="modbus", help="the fieldbus (modbus)")
+    parser.add_argument("--bus", choices=tuple(BUSES), default="modbus", help="the fieldbus")
     parser.add_argument(
         "--hidden",
         action="store_true",

@@ -9,7 +9,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING
 
 from config.errors import CommandFailed, InputError
-from positioner.cli.parts.export_arguments import take_mapping
+from positioner.cli.parts.export_arguments import mapping_of
 from positioner.cli.parts.fit_arguments import add_noise_and_exports, add_pressure, add_test, read_fitted
 from positioner.cli.parts.model_arguments import read_valve, require_effects
 from positioner.cli.parts.naming import files_named, naming
@@ -80,8 +80,7 @@ def run(arguments: argparse.Namespace) -> int:
     for option in ("experiment", "out"):
         writable(getattr(arguments, option), f"--{option}")
     _require_out(arguments)
-    take_mapping(arguments)
-    if not arguments.column and all(map(is_imposed, arguments.recordings)):
+    if not mapping_of(arguments).column and all(map(is_imposed, arguments.recordings)):
         from positioner.cli.parts.diagnose_forces import run_forces
 
         return run_forces(arguments)

@@ -37,11 +37,11 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
     add_test(parser)
     parser.add_argument("--effects", nargs="+", metavar="NAME", help="effects to try (all known effects)")
     add_pressure(parser)
-    parser.add_argument("--budget", type=int, default=60, metavar="MOVES", help="largest number of moves (60)")
+    parser.add_argument("--budget", type=int, default=60, metavar="MOVES", help="largest number of moves")
     parser.add_argument("--out", type=Path, default=Path("discriminated"), help="folder for recordings and verdict")
     parser.add_argument("--name", help="name of the valve, where the file has several")
     add_tls(parser, ", with a certificate of role engineer")
-    parser.add_argument("--seed", type=int, default=0, help="seed of the experiments (0)")
+    parser.add_argument("--seed", type=int, default=0, help="seed of the experiments")
 
 
 def run(arguments: argparse.Namespace) -> int:

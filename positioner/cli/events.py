@@ -32,7 +32,7 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
         "--since", type=_since, metavar="TIME", help="begin there: 30m, 2h or 7d ago, or 2026-03-01T06:00 (UTC)"
     )
     parser.add_argument("--limit", type=_count, metavar="N", help="only the newest N")
-    parser.add_argument("--table", choices=TABLES, default="events", help="what to print (events)")
+    parser.add_argument("--table", choices=TABLES, default="events", help="what to print")
     parser.add_argument("--follow", action="store_true", help="print new entries until Ctrl-C")
     parser.add_argument("--json", action="store_true", help="print a JSON object a line")
 

@@ -20,28 +20,18 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
     """Declare the command line."""
     parser.add_argument("manifest", type=Path, metavar="MANIFEST", help="CSV or TOML: valve, file, recording, when")
     parser.add_argument(
-        "--out",
-        type=Path,
-        default=Path("fleet-out"),
-        metavar="FOLDER",
-        help="folder of examinations and tables (fleet-out)",
+        "--out", type=Path, default=Path("fleet-out"), metavar="FOLDER", help="folder of examinations and tables"
     )
     parser.add_argument("--scheduler", metavar="tcp://HOST:PORT", help="a Dask scheduler (this machine)")
     parser.add_argument("--workers", type=int, metavar="N", help="number of processes (one a core)")
-    parser.add_argument(
-        "--time-limit-s",
-        type=float,
-        default=900.0,
-        metavar="S",
-        help="time limit of one recording (900)",
-    )
+    parser.add_argument("--time-limit-s", type=float, default=900.0, metavar="S", help="time limit of one recording")
     parser.add_argument("--report", type=Path, metavar="FILE.html", help="write the ranking for a browser")
     parser.add_argument(
         "--diagnoses",
         type=int,
         default=10,
         metavar="N",
-        help="number of valves with a diagnosis report, the gravest first (10)",
+        help="number of valves with a diagnosis report, the gravest first",
     )
     parser.add_argument("--since", metavar="DATE", help="print what changed since that day")
     parser.add_argument("--picture", type=Path, metavar="FILE.png", help="with --since: draw it")

@@ -20,14 +20,14 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
     parser.add_argument(
         "-o", "--out", type=Path, metavar="DIR", help="folder for fit.csv, test.csv, valve.toml and sealed.json"
     )
-    parser.add_argument("--effects", type=int, choices=(0, 1, 2), default=1, help="number of hidden effects (1)")
+    parser.add_argument("--effects", type=int, choices=(0, 1, 2), default=1, help="number of hidden effects")
     parser.add_argument(
         "--dirty",
         action="store_true",
         help="with pressure noise, scattered break-away and a 12-bit transmitter",
     )
-    parser.add_argument("--duration-s", type=float, default=30.0, help="length of each recording (30)")
-    parser.add_argument("--period-s", type=float, default=0.01, help="time between samples (0.01)")
+    parser.add_argument("--duration-s", type=float, default=30.0, help="length of each recording")
+    parser.add_argument("--period-s", type=float, default=0.01, help="time between samples")
     parser.add_argument(
         "--reveal", type=Path, metavar="DIR", help="print the answer of a folder, after a check of its seal"
     )

@@ -24,7 +24,7 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
     )
     parser.add_argument("--beta-pa", type=float, help="amplitude of a sine")
     parser.add_argument("--omega-rad-per-s", type=float, help="angular frequency of a sine")
-    parser.add_argument("--timeout-s", type=float, default=600.0, help="give up after this many seconds (600)")
+    parser.add_argument("--timeout-s", type=float, default=600.0, help="give up after this many seconds")
     add_connection(parser)
 
 

@@ -6,7 +6,7 @@ from pathlib import Path
 
 from config.errors import InputError
 from positioner.cli.parts.breaking_off import tell_when_broken_off
-from positioner.cli.parts.export_arguments import add_export_arguments, export_options, read_mapped, take_mapping
+from positioner.cli.parts.export_arguments import add_export_arguments, mapping_of
 from positioner.cli.parts.output_files import recording_writable
 from positioner.cli.parts.progress import Progress
 
@@ -30,26 +30,30 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
 def run(arguments: argparse.Namespace) -> int:
     """Print what the file holds, or what is read of it; 0."""
     from config.plausibility import oddities
+    from workbench.imports.column_mapping import read_status
+    from workbench.imports.export_preview import preview
     from workbench.imports.own_format import own_recording
 
-    take_mapping(arguments)
+    mapping = mapping_of(arguments)
     if arguments.inspect:
         return _inspect(arguments)
     if arguments.out is not None:
         recording_writable(arguments.out, "-o")
-    if arguments.column:
+    if mapping.column:
         progress = Progress()
         with tell_when_broken_off("import", lambda: progress.known):
-            recording = read_mapped(arguments.file, arguments, None, progress)
+            recording = mapping.read(arguments.file, progress=progress)
     else:
         own = own_recording(arguments.file)
         if own is None:
             if arguments.out is not None:
                 raise InputError("-o", "needs to know the columns: --column; without -o this command proposes them")
-            return _list(arguments)
+            read_status(mapping.status)
+            print(f"{arguments.file}: {preview(arguments.file, arguments.sheet).summary()}")
+            return 0
         recording = own
     print(f"{arguments.file}: {recording.summary()}")
-    for said in oddities(recording, arguments.stroke_m):
+    for said in oddities(recording, mapping.stroke_m):
         print(f"look: {said}")
     if arguments.out is not None:
         recording.write(arguments.out)
@@ -60,9 +64,9 @@ def run(arguments: argparse.Namespace) -> int:
 def _inspect(arguments: argparse.Namespace) -> int:
     """Show what the file holds, ask what it leaves open, write it down, and say what reads it."""
 
+    from workbench.imports.export_mapping import write_mapping_file
     from workbench.imports.export_preview import preview
     from workbench.imports.import_questions import ask_for_mapping
-    from workbench.imports.mapping_file import write_mapping_file
 
     found = preview(arguments.file, arguments.sheet)
     print(f"{arguments.file}: {found.summary()}")
@@ -82,11 +86,3 @@ def _ask(question: str, otherwise: str) -> str:
     except EOFError:
         print()
         raise InputError("--inspect", "the answers ended before the questions; nothing was written") from None
-
-
-def _list(arguments: argparse.Namespace) -> int:
-    from workbench.imports.export_preview import preview
-
-    export_options(arguments)
-    print(f"{arguments.file}: {preview(arguments.file, arguments.sheet).summary()}")
-    return 0

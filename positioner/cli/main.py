@@ -120,6 +120,17 @@ def _unread() -> bool:
 NEGATIVE_NUMBER = re.compile(r"-(\d+\.?\d*|\.\d+)(e[-+]?\d+)?$", re.IGNORECASE)
 
 
+class WithDefaults(argparse.HelpFormatter):
+    """Help that ends with the default in brackets, where an option has one."""
+
+    def _get_help_string(self, action: argparse.Action) -> str:
+        default, text = action.default, action.help or ""
+        if default is None or default is False or default in ([], argparse.SUPPRESS):
+            return text
+        values = default if isinstance(default, tuple) else (default,)
+        return f"{text} ({' '.join(f'{each:g}' if isinstance(each, float) else str(each) for each in values)})"
+
+
 class OneLine(argparse.ArgumentParser):
     """A parser that says what is wrong in one line, as every command does, without its usage before it.
 
@@ -128,7 +139,7 @@ class OneLine(argparse.ArgumentParser):
     """
 
     def __init__(self, *what: Any, **named: Any) -> None:
-        super().__init__(*what, **named)
+        super().__init__(*what, **{"formatter_class": WithDefaults, **named})
         self.register("type", float, _finite)
         self._negative_number_matcher = NEGATIVE_NUMBER
 

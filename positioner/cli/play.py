@@ -40,16 +40,16 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
     parser.add_argument(
         "--reference", type=Path, required=True, metavar="REF.csv", help="columns time_s and reference_m"
     )
-    parser.add_argument("--law", choices=law_names(), default=DEFAULT_LAW, help=f"the control law ({DEFAULT_LAW})")
+    parser.add_argument("--law", choices=law_names(), default=DEFAULT_LAW, help="the control law")
     parser.add_argument(
         "--extended",
         type=Path,
         metavar="VALVE.toml",
         help="run twice, without and with this valve file in the law; print both errors",
     )
-    parser.add_argument("--period-s", type=float, default=1e-3, help="period of the control loop (1e-3)")
-    parser.add_argument("--noise-m", type=float, default=0.0, help="standard deviation of the sensor's noise (0)")
-    parser.add_argument("--seed", type=int, default=0, help="seed of the noise (0)")
+    parser.add_argument("--period-s", type=float, default=1e-3, help="period of the control loop")
+    parser.add_argument("--noise-m", type=float, default=0.0, help="standard deviation of the sensor's noise")
+    parser.add_argument("--seed", type=int, default=0, help="seed of the noise")
     parser.add_argument("-o", "--out", type=Path, required=True, metavar="REC.csv", help="the recording")
 
 

@@ -26,10 +26,10 @@ DAYS_A_YEAR = 365.25  # Julian
 def add_arguments(parser: argparse.ArgumentParser) -> None:
     """Declare the command line."""
     add_test_arguments(parser, recordings=False)
-    _add_share(parser, "--travel", 0.1, "travel of the test, share of the stroke (0.1)")
-    _add_share(parser, "--beyond", 0.05, "travel beyond --travel that ends the test (0.05)")
+    _add_share(parser, "--travel", 0.1, "travel of the test, share of the stroke")
+    _add_share(parser, "--beyond", 0.05, "travel beyond --travel that ends the test")
     _add_share(parser, "--least", None, "least travel to pass (0.8 of --travel)")
-    _add_share(parser, "--start", 0.005, "travel that counts as break-out (0.005)")
+    _add_share(parser, "--start", 0.005, "travel that counts as break-out")
     parser.add_argument("--towards", choices=("open", "closed"), help="direction (away from the nearer end)")
     parser.add_argument("--step", action="store_true", help="step at the rate limit in place of a ramp")
     parser.add_argument("--threshold-pa", type=float, metavar="PA", help="the command stays within this pressure")
@@ -39,15 +39,15 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
         metavar="RATE",
         help="dangerous undetected failures; prints PFD_avg with and without the test",
     )
-    _add_share(parser, "--partial-coverage", 0.6, "share of these failures that the partial stroke shows (0.6)")
-    _add_share(parser, "--proof-coverage", 0.9, "share of these failures that the proof test shows (0.9)")
+    _add_share(parser, "--partial-coverage", 0.6, "share of these failures that the partial stroke shows")
+    _add_share(parser, "--proof-coverage", 0.9, "share of these failures that the proof test shows")
     parser.add_argument(
-        "--every-days", type=float, default=30.0, metavar="DAYS", help="interval of the partial stroke test (30)"
+        "--every-days", type=float, default=30.0, metavar="DAYS", help="interval of the partial stroke test"
     )
     parser.add_argument(
-        "--proof-every-years", type=float, default=5.0, metavar="YEARS", help="interval of the proof test (5)"
+        "--proof-every-years", type=float, default=5.0, metavar="YEARS", help="interval of the proof test"
     )
-    parser.add_argument("--life-years", type=float, default=20.0, metavar="YEARS", help="life of the valve (20)")
+    parser.add_argument("--life-years", type=float, default=20.0, metavar="YEARS", help="life of the valve")
 
 
 def _add_share(parser: argparse.ArgumentParser, option: str, default: float | None, text: str) -> None:

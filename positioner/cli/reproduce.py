@@ -18,7 +18,7 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
     """Declare the command line."""
     parser.add_argument("--out", type=Path, metavar="DIR", help="draw the figures there")
     parser.add_argument("--json", type=Path, metavar="FILE", help="write the numbers as JSON")
-    parser.add_argument("--seeds", type=int, default=100, help="runs per cell of the noise table (100)")
+    parser.add_argument("--seeds", type=int, default=100, help="runs per cell of the noise table")
 
 
 def run(arguments: argparse.Namespace) -> int:

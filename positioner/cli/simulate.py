@@ -23,8 +23,8 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
         help="columns time_s and command_pa (of a valve with a positioner reference_m); each row holds until the next",
     )
     parser.add_argument("-o", "--out", type=Path, required=True, metavar="REC.csv", help="the recording")
-    parser.add_argument("--noise-m", type=float, default=0.0, help="standard deviation of the sensor's noise (0)")
-    parser.add_argument("--seed", type=int, default=0, help="seed of the noise (0)")
+    parser.add_argument("--noise-m", type=float, default=0.0, help="standard deviation of the sensor's noise")
+    parser.add_argument("--seed", type=int, default=0, help="seed of the noise")
 
 
 def run(arguments: argparse.Namespace) -> int:

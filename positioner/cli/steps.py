@@ -26,9 +26,9 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
     parser.add_argument(
         "--dead-band-pa", type=float, metavar="PA", help="expected dead band (twice the known friction)"
     )
-    parser.add_argument("--held-s", type=float, default=0.8, metavar="S", help="duration of each step (0.8)")
+    parser.add_argument("--held-s", type=float, default=0.8, metavar="S", help="duration of each step")
     parser.add_argument(
-        "--most", type=float, default=0.3, metavar="SHARE", help="travel that stops the test, share of the stroke (0.3)"
+        "--most", type=float, default=0.3, metavar="SHARE", help="travel that stops the test, share of the stroke"
     )
 
 

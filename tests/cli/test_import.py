@@ -107,10 +107,6 @@ def test_the_words_that_import_proposes_lead_to_a_verdict(
         (["-o", "rec.csv"], "-o: needs to know the columns: --column"),
         (["--column", "time_s=t"], "command_pa is not given: add --column command_pa=THEIRS:UNIT"),
         (
-            ["--column", "time_s=t", "--column", "position_m=x:mm", "--column", "command_pa=u:bar", "--stroke-m", "-1"],
-            "--stroke-m",
-        ),
-        (
             ["--column", "time_s=t", "--column", "position_m=x:mm", "--column", "command_pa=u:bar", "--status", "Q"],
             "--status",
         ),
@@ -130,6 +126,16 @@ def test_what_it_cannot_do_is_one_line(
     assert said in printed.err
     assert printed.err.count("\n") == 1
     assert [each.name for each in tmp_path.iterdir()] == ["a.csv"]
+
+
+@pytest.mark.parametrize("stroke", ["-1", "0", "M", "nan"])
+def test_a_stroke_that_is_none_is_one_line(stroke: str, capsys: Capture) -> None:
+    with pytest.raises(SystemExit) as ended:
+        main(["import", "a.csv", "--stroke-m", stroke])
+    assert ended.value.code == 2
+    error = capsys.readouterr().err
+    assert "--stroke-m" in error
+    assert error.count("\n") == 1
 
 
 def test_an_option_of_exports_without_columns_is_refused(tmp_path: Path, capsys: Capture) -> None:

@@ -203,7 +203,7 @@ def test_what_reads_an_export_of_a_drive_is_proposed_by_its_units(tmp_path: Path
     rows = zip(TIME_S.tolist(), CURRENT_A.tolist(), np.degrees(ANGLE_RAD).tolist(), strict=True)
     path.write_text("t [s];Iq [A];phi [deg]\n" + "".join(f"{a:.4f};{b:.6f};{c:.6f}\n" for a, b, c in rows))
     found = preview(path)
-    assert found.open == ()
+    assert found.proposal.open == ()
     words = [each for each in found.words if "=" in each]
     assert words == ["time_s=t [s]:s", "position_rad=phi [deg]:deg", "command_a=Iq [A]:A"]
     assert read_export(path, read_mapping(words), None).kind.name == "rotary motor"

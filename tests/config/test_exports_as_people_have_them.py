@@ -745,7 +745,7 @@ PROPOSED = {
     ),
     "no time": (
         [line.partition(",")[2] for line in rows(header="t,Hub [mm],Stelldruck [bar]")],
-        "--period-s S --column position_m=Hub [mm]:mm --column command_pa=Stelldruck [bar]:bar",
+        "--column position_m=Hub [mm]:mm --column command_pa=Stelldruck [bar]:bar --period-s S",
     ),
     "volts": (
         rows(header="t,Hub [V],Stelldruck [bar]", pv=[f"{0.1 * x:.3f}" for x in PV]),

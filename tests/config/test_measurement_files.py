@@ -262,7 +262,8 @@ def test_columns_of_several_groups_are_joined_each_by_its_own_time(tmp_path: Pat
     np.testing.assert_allclose(recording.columns["pressure_pa"], 1e5 * COMMAND_BAR)
     assert "clocks" not in recording.metadata, "both groups are of the same instants"
     assert (
-        "of other times, not shown: run 2, 200 rows: t [s], PV [mm], OUT [bar]" in preview(tmp_path / "run.tdms").open
+        "of other times, not shown: run 2, 200 rows: t [s], PV [mm], OUT [bar]"
+        in preview(tmp_path / "run.tdms").proposal.open
     )
 
 

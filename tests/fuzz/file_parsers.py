@@ -43,9 +43,9 @@ from tests.certificates import revoke, tls
 from tests.daemon.memory.test_memory_file import KNOWLEDGE, NOW
 from tests.fuzz.parser import Later, Parser, refused_in_one_line, require_line
 from workbench.imports.column_mapping import read_mapping
+from workbench.imports.export_mapping import read_mapping_file
 from workbench.imports.export_preview import preview
 from workbench.imports.historian_export import read_export
-from workbench.imports.mapping_file import read_mapping_file
 from workbench.imports.own_format import own_recording
 
 NODE = 5

@@ -1,6 +1,8 @@
 """What lies on a desk: a step back brings it again, and what is shown goes home as words of a command line."""
 
 import argparse
+import json
+import re
 from collections.abc import Iterator
 from dataclasses import replace
 from functools import cache
@@ -14,16 +16,17 @@ import pytest
 from config.errors import CommandFailed, InputError
 from config.recording import Recording
 from config.valve_file import shipped_valve
-from positioner.cli.parts.export_arguments import add_export_arguments, read_mapped
+from positioner.cli.parts.export_arguments import add_export_arguments, mapping_of
 from tests.pages.laid_out import hidden
 from workbench.diagnosis.extension import extend
+from workbench.imports.export_mapping import ExportMapping
 from workbench.imports.export_preview import preview
 from workbench.page import desk as desk_module
 from workbench.page.background import Limits, News, Raced, Work, run_diagnosis
 from workbench.page.command_lines import command_lines
 from workbench.page.desk import SAVED, Desk, name_valve
 from workbench.page.notebook import notebook
-from workbench.page.opening import ColumnChoice, Export, Opened, map_export, open_file_like, wrong_with
+from workbench.page.opening import Export, Opened, map_export, open_file_like, wrong_with
 from workbench.page.provenance import NamedValve
 from workbench.page.search import Search
 from workbench.page.search_panel import SearchPanel
@@ -94,7 +97,7 @@ def test_a_recording_that_cannot_be_held_out_is_refused_and_nothing_changes(desk
 
 def test_an_export_is_held_out_as_the_first_was_read(tmp_path: Path) -> None:
     (tmp_path / "b.csv").write_text("t;PV;OUT\n" + "".join(f"{i / 100};{i};{100 * i}\n" for i in range(500)))
-    choice = ColumnChoice({"time_s": "t:s", "position_m": "PV:mm", "command_pa": "OUT:Pa"})
+    choice = ExportMapping(column=("time_s=t:s", "position_m=PV:mm", "command_pa=OUT:Pa"))
     found = open_file_like(tmp_path / "b.csv", "b.csv", replace(first(), choice=choice))
     assert found.recording.columns["position_m"][100] == pytest.approx(0.1)
     with pytest.raises(InputError, match="their columns differ"):
@@ -148,43 +151,39 @@ def test_a_time_that_is_over_at_once_says_that_nothing_is_known() -> None:
 
 
 def test_the_notebook_reads_an_export_as_it_was_read(desk: Desk) -> None:
-    choice = ColumnChoice({"time_s": "t:s", "position_m": "PV:%", "command_pa": "OUT:%"}, 0.04, "", ",", (1e4, 9e4))
+    columns = ("time_s=t:s", "position_m=PV:%", "command_pa=OUT:%")
+    choice = ExportMapping(column=columns, stroke_m=0.04, range_pa=(1e4, 9e4), decimal=",")
     assert desk.opened is not None
     desk.opened = replace(first(), choice=choice)
     text = notebook(desk)
-    assert "from workbench.imports.historian_export import read_export" in text
-    assert "'position_m=PV:%', 'command_pa=OUT:%']), 0.04, (10000.0, 90000.0), Exp" in text
-    assert "ExportOptions(',', None)" in text
+    source = "".join("".join(cell["source"]) for cell in json.loads(text)["cells"] if "ExportMapping(" in str(cell))
+    written = re.search(r"ExportMapping\((.*?)\)\.read\(", source, re.DOTALL)
+    assert written is not None
+    assert eval(f"ExportMapping({written[1]})") == choice
 
 
 @pytest.mark.parametrize(
-    ("choice", "reads"),
+    "choice",
     [
-        (ColumnChoice({"time_s": "t:s", "position_m": "PV:mm", "command_pa": "OUT:%"}), (2e4, 1e5)),
-        (
-            ColumnChoice({"time_s": "t:s", "position_m": "PV:mm", "command_pa": "OUT:mA"}, range_pa=(0.0, 1.2e5)),
-            (0.0, 1.2e5),
-        ),
-        (ColumnChoice({"time_s": "t:s", "position_m": "PV:mm", "command_pa": "OUT:bar"}, range_pa=(0.0, 1.2e5)), None),
-        (ColumnChoice({"position_m": "PV:mm", "command_pa": "OUT:%"}, period_s=0.5, status=("Q=Good",)), (2e4, 1e5)),
+        ExportMapping(column=("time_s=t:s", "position_m=PV:mm", "command_pa=OUT:%")),
+        ExportMapping(column=("time_s=t:s", "position_m=PV:mm", "command_pa=OUT:mA"), range_pa=(0.0, 1.2e5)),
+        ExportMapping(column=("time_s=t:s", "position_m=PV:mm", "command_pa=OUT:bar"), range_pa=(0.0, 1.2e5)),
+        ExportMapping(column=("position_m=PV:mm", "command_pa=OUT:%"), period_s=0.5, status=("Q=Good",)),
     ],
 )
-def test_the_words_of_a_choice_read_the_file_as_the_page_does(
-    choice: ColumnChoice, reads: tuple[float, float] | None, tmp_path: Path
-) -> None:
-    """What 0 and 100 % are stands in the words wherever a pressure is a share, assumed or said."""
-    shown = {"OUT:bar": 0.5, "OUT:mA": 12.0}.get(choice.columns["command_pa"], 50.0)
+def test_the_words_of_a_choice_read_the_file_as_the_page_does(choice: ExportMapping, tmp_path: Path) -> None:
+    shown = {"OUT:bar": 0.5, "OUT:mA": 12.0}.get(choice.theirs["command_pa"], 50.0)
     rows = [f"{0.5 * i},{i % 7},{shown + i % 3},Good" for i in range(60)]
     (tmp_path / "a.csv").write_text("\n".join(["t,PV,OUT,Q", *rows]))
-    read = map_export(Export("a.csv", tmp_path / "a.csv", preview(tmp_path / "a.csv"), choice), choice)
+    read = map_export(Export("a.csv", tmp_path / "a.csv", preview(tmp_path / "a.csv")), choice)
     parser = argparse.ArgumentParser()
     add_export_arguments(parser)
-    again = read_mapped(tmp_path / "a.csv", parser.parse_args(list(choice.words)), None)
+    again = mapping_of(parser.parse_args([*choice.words])).read(tmp_path / "a.csv")
     np.testing.assert_array_equal(again.command_pa, read.recording.command_pa)
     np.testing.assert_array_equal(again.time_s, read.recording.time_s)
-    assert choice.ends_pa == reads
+    assert again.metadata == read.recording.metadata, "what was assumed is told by both"
     assumed = any(each.startswith("assumed: command_pa") for each in wrong_with(read, None))
-    assert assumed is (reads is not None and choice.range_pa is None)
+    assert assumed is ("OUT:%" in choice.theirs["command_pa"])
 
 
 def test_a_dropped_valve_file_whose_own_effect_stayed_behind_says_so(tmp_path: Path) -> None:

@@ -30,5 +30,5 @@ def test_what_an_export_needs_is_chosen_on_the_page(tmp_path: Path) -> None:
 
 def test_a_column_that_is_not_found_is_chosen_on_the_page(tmp_path: Path) -> None:
     (tmp_path / "odd.csv").write_text("t,a,b\n0,1.5,1\n1,1.5,1\n")
-    said = [in_page_words(each) for each in preview(tmp_path / "odd.csv").open]
+    said = [in_page_words(each) for each in preview(tmp_path / "odd.csv").proposal.open]
     assert "position_m is open: no column is called like it; choose it here" in said

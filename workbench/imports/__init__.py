@@ -14,7 +14,8 @@ From the file to the recording:
     reader_process                          that process: it may break down or come to no end, and nothing else does
     turned_tables                           a row a signal, a row a value: made a column a signal
     cell_units                              units, by all the names people give them
-    column_mapping                          `OURS=THEIRS:UNIT`, `--status`, and how else an export is read
+    export_mapping                          how an export is read, one object; kept in a file for next time
+    column_mapping                          `OURS=THEIRS:UNIT`, `--status`
     header_search                           the line that names the columns, and the units about it
     cell_kinds, number_notation             what a cell may be; decimal signs and thousands separators
     sample_rows                             the samples under the header, as cells
@@ -27,5 +28,5 @@ From the file to the recording:
     control_loop                            whether it is a loop's, OP, PV and SP, and tells of no stem
     loop_reader                             a loop read: time, OP, PV, SP and mode
     column_preview, export_preview          what a file holds, looked at by the code that reads it
-    import_questions, mapping_file          what they leave open, asked; the answers, kept in a file for next time
+    import_questions                        what they leave open, asked
 """

@@ -1,7 +1,7 @@
 """What a file holds, and the words that may read it: looked at by the code that reads it."""
 
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from pathlib import Path
 
 from config.results.block import Block, Table, as_text
@@ -18,7 +18,7 @@ from workbench.imports.column_preview import (
 from workbench.imports.control_loop import LoopColumn, LoopColumns, loops_of
 from workbench.imports.file_kind import raw_tables
 from workbench.imports.header_search import SHOWN, Header
-from workbench.imports.proposal import is_clock, proposal, quote_word
+from workbench.imports.proposal import Proposal, is_clock, proposal, quote_word
 from workbench.imports.raw_table import RawTable
 
 FIRST_CELLS = 3
@@ -34,17 +34,20 @@ class ExportPreview:
         what: how it was taken.
         header: where its columns are named, or that they are not.
         columns: in their order.
-        words: what would read it, words of the command line; none of a loop's without a stem.
-        open: what a person must say or look at.
+        proposal: how it may be read, and what a person must say; nothing of a loop's without a stem.
         loops: the loops that it is of.
     """
 
     what: str
     header: str
     columns: tuple[ColumnPreview, ...]
-    words: tuple[str, ...]
-    open: tuple[str, ...]
+    proposal: Proposal
     loops: tuple[LoopColumns, ...] = ()
+
+    @property
+    def words(self) -> tuple[str, ...]:
+        """What would read it, words of the command line."""
+        return (*self.proposal.mapping.words, *self.proposal.blanks)
 
     def summary(self) -> str:
         """Say the columns, the proposal and what is open."""
@@ -59,7 +62,7 @@ class ExportPreview:
         return [
             f"{self.what}; {self.header}",
             Table(("column", "unit", "row 1", "row 2", "row 3"), rows),
-            *self.open,
+            *self.proposal.open,
             f"proposed, check it: {proposed}" if proposed else "nothing is proposed",
         ]
 
@@ -74,25 +77,20 @@ def preview(path: Path, sheet: str | None = None) -> ExportPreview:
     header = read_header(path, tables)
     columns = columns_of(header)
     besides = _besides(header.table, tables)
-    words, open_ = proposal(columns, header.table.separator)
-    if header.table.sheet and not _reads(words):
+    proposed = proposal(columns, header.table.separator)
+    if header.table.sheet and not proposed.reads:
         of_all = columns_of_all(tables, header)
         wider = proposal(of_all, header.table.separator)
-        if _reads(wider[0]):
-            columns, (words, open_), besides = of_all, wider, []
+        if wider.reads:
+            columns, proposed, besides = of_all, wider, []
     decimal, is_open = find_sign(columns, header.table.separator)
     signals = [each for each in columns if each.numbers and not is_clock(each)]
     told = (loops_of([_of_loop(each, sign) for each in signals]) for sign in (",." if is_open else decimal))
     loops = tuple(next(filter(None, told), ()))
     if loops and not any(each.position for each in loops):
-        words, open_ = (), tuple(_no_stem(path, each) for each in loops)
-    return ExportPreview(_what(header, tables), _place(header), tuple(columns), words, (*open_, *besides), loops)
-
-
-def _reads(words: Sequence[str]) -> bool:
-    """Whether words name a position and what is asked of it."""
-    ours = {word.partition("=")[0] for word in words if "=" in word}
-    return len(ours - {"time_s"}) > 1
+        proposed = Proposal(open=tuple(_no_stem(path, each) for each in loops))
+    proposed = replace(proposed, open=(*proposed.open, *besides))
+    return ExportPreview(_what(header, tables), _place(header), tuple(columns), proposed, loops)
 
 
 def _what(header: Header, tables: Sequence[RawTable]) -> str:

@@ -8,21 +8,21 @@ from workbench.imports.cell_units import SHARES
 from workbench.imports.column_mapping import RANGE_PA, Source, read_mapping
 from workbench.imports.column_names import COMMON
 from workbench.imports.column_preview import GOOD, ColumnPreview
+from workbench.imports.export_mapping import ExportMapping
 from workbench.imports.export_preview import ExportPreview
-from workbench.imports.mapping_file import MappingTable
 
 Ask = Callable[[str, str], str]
 """Given a question and what is taken where nothing is answered; returns the answer."""
 NEEDED = ("position_m",)
 
 
-def ask_for_mapping(found: ExportPreview, ask: Ask) -> MappingTable:
+def ask_for_mapping(found: ExportPreview, ask: Ask) -> ExportMapping:
     """Return the mapping that a file's proposal and a person's answers make.
 
     Raises:
         InputError: an answer that is none of those allowed; names the question.
     """
-    words = _propose_columns(found)
+    words = found.proposal.mapping.theirs
     asked = [ours if ours != "command_pa" or "reference_m" not in words else "reference_m" for ours in COMMON]
     columns = [word for ours in asked if (word := _column(ours, words.get(ours), found, ask))]
     timed = any(each.startswith("time_s=") for each in columns)
@@ -30,24 +30,14 @@ def ask_for_mapping(found: ExportPreview, ask: Ask) -> MappingTable:
     sources = read_mapping(columns, period_s)
     status = [word for each in found.columns if (word := _status(each, ask))]
     (position,) = (each for each in sources if each.name == "position_m")
-    return MappingTable(
+    return ExportMapping(
         column=tuple(columns),
         stroke_m=_stroke_m(position, ask),
         range_pa=_range_pa(sources, ask),
-        time_format=_after(found, "--time-format"),
+        time_format=found.proposal.mapping.time_format,
         status=tuple(status),
         period_s=period_s,
     )
-
-
-def _propose_columns(found: ExportPreview) -> dict[str, str]:
-    """Return `THEIRS` or `THEIRS:UNIT` as proposed, by ours."""
-    given = [word for flag, word in zip(found.words, found.words[1:], strict=False) if flag == "--column"]
-    return {word.partition("=")[0]: word.partition("=")[2] for word in given}
-
-
-def _after(found: ExportPreview, flag: str) -> str | None:
-    return found.words[found.words.index(flag) + 1] if flag in found.words else None
 
 
 def _column(ours: str, proposed: str | None, found: ExportPreview, ask: Ask) -> str:
@@ -58,7 +48,9 @@ def _column(ours: str, proposed: str | None, found: ExportPreview, ask: Ask) -> 
         if not answer and ours in NEEDED:
             raise InputError(ours, "is needed: a recording has a position")
         return f"{ours}={answer}" if answer else ""
-    if not any(proposed.rpartition(":")[0] in each and "is open" in each for each in found.open if "unit of" in each):
+    if not any(
+        proposed.rpartition(":")[0] in each and "is open" in each for each in found.proposal.open if "unit of" in each
+    ):
         return f"{ours}={proposed}"
     name, _, unit = proposed.rpartition(":") if ":" in proposed else (proposed, "", "s")
     return f"{ours}={name}:{ask(f'the unit of {name!r}, for {ours}?', unit)}"

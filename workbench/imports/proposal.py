@@ -1,13 +1,13 @@
-"""The words that may read a file, proposed by what its columns are commonly called and by what is in them.
+"""How a file may be read, proposed by what its columns are commonly called and by what is in them.
 
-They are printed, never used: a person looks at them first.
+It is shown, never used: a person looks at it first.
 """
 
 import re
 import shlex
 from collections import Counter
 from collections.abc import Iterator, Sequence
-from dataclasses import replace
+from dataclasses import dataclass, field, replace
 from math import inf
 from pathlib import Path
 
@@ -22,6 +22,7 @@ from workbench.imports.column_clock import time_base
 from workbench.imports.column_mapping import RANGE_PA
 from workbench.imports.column_names import COMMON, COUNTER, SETPOINT, STATUS, is_called, rank_by_name
 from workbench.imports.column_preview import GOOD, ColumnPreview, find_sign
+from workbench.imports.export_mapping import ExportMapping
 from workbench.imports.raw_table import Cell
 from workbench.imports.time_stamps import propose_formats, seconds_of
 
@@ -35,10 +36,26 @@ LEAST_PER_CENT, MOST_SHARE = 3.0, 130.0
 """Between which the greatest of some numbers in % lies: below are shares of 1, or bar."""
 
 
-def proposal(columns: Sequence[ColumnPreview], separator: str) -> tuple[tuple[str, ...], tuple[str, ...]]:
-    """Return the words of a command line that may read a file, and what a person must say or look at."""
-    words: list[str] = []
+@dataclass(frozen=True, slots=True)
+class Proposal:
+    """How a file may be read, the options that a person must fill in, and what they must say or look at."""
+
+    mapping: ExportMapping = field(default_factory=ExportMapping)
+    blanks: tuple[str, ...] = ()
+    open: tuple[str, ...] = ()
+
+    @property
+    def reads(self) -> bool:
+        """Whether it names a position and what is asked of it."""
+        return len(self.mapping.theirs.keys() - {"time_s"}) > 1
+
+
+def proposal(columns: Sequence[ColumnPreview], separator: str) -> Proposal:
+    """Return how a file may be read."""
+    mapped: list[str] = []
+    blanks: list[str] = []
     open_: list[str] = []
+    time_format = None
     left = list(columns)
     decimal, sign_open = find_sign(columns, separator)
     of_drive = _of_drive(columns)
@@ -46,7 +63,7 @@ def proposal(columns: Sequence[ColumnPreview], separator: str) -> tuple[tuple[st
         chosen = of_drive.get(ours) or (_clock(left) if ours == "time_s" else _likeliest(ours, left))
         if chosen is None:
             open_.append(_not_called(ours))
-            words += ["--period-s", "S"] if ours == "time_s" else []
+            blanks += ["--period-s", "S"] if ours == "time_s" else []
             continue
         left.remove(chosen)
         name = "reference_m" if ours == "command_pa" and _is_setpoint(chosen) else ours
@@ -55,14 +72,15 @@ def proposal(columns: Sequence[ColumnPreview], separator: str) -> tuple[tuple[st
         unit, doubt = _unit_of(name, chosen, decimal)
         if doubt and chosen.unknown and unit.removeprefix(":") not in {volts for volts, *_ in VOLTS}:
             doubt = [f"the unit of {chosen.name!r} is {chosen.unknown!r} by the file, none known; {unit} is a guess"]
-        words += ["--column", f"{name}={chosen.name}{unit}"]
+        mapped.append(f"{name}={chosen.name}{unit}")
         open_ += doubt
         if ours == "time_s" and not chosen.numbers:
-            words += _time_words(chosen, open_)
-    words += [word for each in left if each.opc_qualities for word in ("--status", f"{each.name}={GOOD}")]
+            time_format = _time_format(chosen, open_)
+    status = tuple(f"{each.name}={GOOD}" for each in left if each.opc_qualities)
     open_ += [*_doubts(left), *([sign_open] if sign_open else [])]
-    words += _shares(words, open_)
-    return tuple(words), tuple(open_)
+    blanks += _shares(mapped, open_)
+    mapping = ExportMapping(column=tuple(mapped), time_format=time_format, status=status)
+    return Proposal(mapping, tuple(blanks), tuple(open_))
 
 
 def _not_called(ours: str) -> str:
@@ -127,10 +145,10 @@ def _span_s(clock: ColumnPreview) -> float:
         return inf
 
 
-def _shares(words: Sequence[str], open_: list[str]) -> list[str]:
+def _shares(mapped: Sequence[str], open_: list[str]) -> list[str]:
     """Return the words, to be filled in, that say what 100 % of a position is, and 0 and 100 % of a pressure."""
     found: list[str] = []
-    units = {word.partition("=")[0]: word.rpartition(":")[2].removeprefix("-") for word in words if "=" in word}
+    units = {word.partition("=")[0]: word.rpartition(":")[2].removeprefix("-") for word in mapped}
     if units.get("position_m") in SHARES or units.get("reference_m") in SHARES:
         found += ["--stroke-m", "M"]
     if units.get("command_pa") in SHARES:
@@ -271,17 +289,17 @@ def _at_the_end(ours: str, name: str) -> str | None:
     return unit if unit in list_allowed_units(ending_of(ours)) and unit != "in" else None
 
 
-def _time_words(column: ColumnPreview, open_: list[str]) -> list[str]:
+def _time_format(column: ColumnPreview, open_: list[str]) -> str | None:
     texts = [str(cell) for cell in column.cells if cell != "" and begins_number(cell)]
     if not texts or all(re.match(STAMP, text) for text in texts):
-        return []
+        return None
     formats = propose_formats(texts)
     if not formats:
         open_.append(f"how {texts[0]!r} is to be read is open: --time-format")
-        return []
+        return None
     if len(formats) > 1:
         open_.append(f"{texts[0]!r} may be read as {' or '.join(formats)}: the first is proposed")
-    return ["--time-format", formats[0]]
+    return formats[0]
 
 
 def quote_word(word: str) -> str:

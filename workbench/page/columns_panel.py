@@ -2,19 +2,20 @@
 
 import math
 from collections.abc import Awaitable, Callable
-from dataclasses import replace
 
 from nicegui import ui
 
 from config.errors import InputError
+from config.loading import validate
 from webpage.figure_view import Figure, FigureView
 from webpage.messages import aside, heading, sentences
 from webpage.number_field import NumberField
 from webpage.theme import Theme
 from workbench.imports.column_mapping import RANGE_PA, list_units
+from workbench.imports.export_mapping import ExportMapping
 from workbench.page.desk import Desk
 from workbench.page.export_figure import export_figure
-from workbench.page.opening import OURS, ColumnChoice, Export, Opened, map_export, split_column, wrong_with
+from workbench.page.opening import OURS, Export, Opened, map_export, split_column, wrong_with
 
 NONE, AS_SAID = "", ""
 WORDS = {
@@ -43,11 +44,12 @@ class ColumnsPanel:
         self._export = export
         self._theme = theme
         self._take = take
+        self._proposed = export.preview.proposal.mapping
         self._asked = 0
         self._read: Opened | None = None
         heading(f"{export.name}: which column is which?")
         ui.label(f"{export.preview.what}; {export.preview.header}").classes("quiet")
-        sentences(export.preview.open, "open")
+        sentences(export.preview.proposal.open, "open")
         with ui.element("div").classes("together"):
             with ui.column().classes("side"):
                 self._columns = {ours: self._column(ours) for ours in OURS}
@@ -55,7 +57,7 @@ class ColumnsPanel:
                 stroke_m = desk.valve.file.valve.stroke_m if desk.valve else None
                 value = None if stroke_m is None else round(unit.per_si * stroke_m, 6)
                 self._stroke = NumberField(f"stroke, {unit.name}, if position is in %", value, name="--stroke-m")
-                self._time_format = ui.input("how dates are written", value=export.proposed.time_format)
+                self._time_format = ui.input("how dates are written", value=self._proposed.time_format or "")
                 self._ends = [self._end(end, usual) for end, usual in zip(("0", "100"), RANGE_PA, strict=True)]
                 self._period = NumberField("time between rows, s, if no column is a time", name="--period-s")
                 self._period.props('data-testid="period"')
@@ -69,7 +71,7 @@ class ColumnsPanel:
         ui.timer(0.0, self._show, once=True)
 
     def _column(self, ours: str) -> tuple[ui.select, ui.select]:
-        name, unit = split_column(ours, self._export.proposed.columns[ours])
+        name, unit = split_column(ours, self._proposed.theirs.get(ours, ""))
         names = [each.name for each in self._export.preview.columns]
         columns = dict.fromkeys([*names, name]) | {NONE: "not there"}
         columns = {key: text or key for key, text in columns.items()}
@@ -97,21 +99,22 @@ class ColumnsPanel:
         low, high = (end / per_si for end in ends if end is not None)
         return low, high
 
-    def _choice(self) -> ColumnChoice:
-        said = {
-            ours: f"{column.value}:{unit.value}" if column.value and unit.value else column.value or ""
+    def _choice(self) -> ExportMapping:
+        said = [
+            f"{ours}={column.value}{f':{unit.value}' if unit.value else ''}"
             for ours, (column, unit) in self._columns.items()
-        }
+            if column.value
+        ]
         stroke = self._stroke.number()
         stroke_m = stroke / self._desk.units.length_unit().per_si if stroke else None
-        return replace(
-            self._export.proposed,
-            columns=said,
-            stroke_m=stroke_m,
-            time_format=self._time_format.value or "",
-            range_pa=self._range_pa(),
-            period_s=self._period.number(),
-        )
+        typed = {
+            "column": said,
+            "stroke_m": stroke_m,
+            "time_format": self._time_format.value or None,
+            "range_pa": self._range_pa(),
+            "period_s": self._period.number(),
+        }
+        return validate(ExportMapping, self._proposed.model_dump() | typed, self._export.name)
 
     async def _show(self) -> None:
         """Read it as chosen and show what it would be, or why it cannot be read so."""

@@ -15,9 +15,7 @@ from workbench.report.comparison_report import headline
 
 KERNEL = {"kernelspec": {"display_name": "Python 3", "language": "python", "name": "python3"}}
 IMPORTS = "from pathlib import Path\n\nimport positioner as pos"
-EXPORTS = """
-from workbench.imports.column_mapping import ExportOptions, read_mapping, read_status
-from workbench.imports.historian_export import read_export"""
+EXPORTS = "\nfrom workbench.imports.export_mapping import ExportMapping"
 Cell = Mapping[str, Any]
 
 
@@ -107,13 +105,5 @@ def _read(opened: Opened) -> str:
     path = f"Path({opened.name!r})"
     if opened.choice is None:
         return f"pos.Recording.read({path})"
-    choice = opened.choice
-    period = "" if choice.period_s is None else f", {choice.period_s!r}"
-    options = [f"{choice.decimal or None!r}", f"{choice.time_format or None!r}"]
-    options += [f"status=read_status({list(choice.status)!r})"] if choice.status else []
-    options += [f"period_s={choice.period_s!r}"] if choice.period_s is not None else []
-    return (
-        "read_export(\n"
-        f"    {path}, read_mapping({choice.named!r}{period}), {choice.stroke_m!r}, {choice.ends_pa!r}, "
-        f"ExportOptions({', '.join(options)})\n)"
-    )
+    said = "".join(f"    {key}={value!r},\n" for key, value in opened.choice.model_dump(exclude_defaults=True).items())
+    return f"ExportMapping(\n{said}).read({path})"

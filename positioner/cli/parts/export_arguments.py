@@ -11,13 +11,9 @@ from config.errors import InputError
 from positioner.cli.parts.progress import at_work
 
 if TYPE_CHECKING:
-    from collections.abc import Callable
-
     from config.recording import Recording
-    from workbench.imports.column_mapping import ExportOptions
+    from workbench.imports.export_mapping import ExportMapping
 
-BESIDES = ("stroke_m", "range_pa", "decimal", "time_format", "status", "sheet", "period_s")
-"""Options that say how mapped columns are read."""
 LARGE_FILE_BYTES = 50_000_000
 """Bytes of a file whose reading takes seconds."""
 
@@ -72,7 +68,7 @@ def add_export_arguments(parser: argparse.ArgumentParser) -> None:
 
 def _stroke(word: str) -> float:
     """Read a stroke; `M`, as `import` proposes it, is a word for one that only a person knows."""
-    return _read_number(word, "the stroke in metres, a number: 0.04 is 40 mm")
+    return _read_number(word, "the stroke in metres, a positive number: 0.04 is 40 mm", positive=True)
 
 
 def _pressure(word: str) -> float:
@@ -97,31 +93,25 @@ def _read_number(word: str, what: str, *, positive: bool = False) -> float:
 
 
 def export_words(arguments: argparse.Namespace) -> list[str]:
-    """Return the words of these arguments as they were given, for a command that reads the same files."""
-    words: list[str] = []
-    for name in ("from_s", "to_s", "column", "mapping", *BESIDES):
-        given, flag = getattr(arguments, name), f"--{name.replace('_', '-')}"
-        if name in ("column", "status"):
-            words += [word for each in given for word in (flag, each)]
-        elif given is not None:
-            words += [flag, *map(str, given if isinstance(given, list) else [given])]
-    return words
+    """Return the words of these arguments, for a command that reads the same files."""
+    from workbench.imports.export_mapping import words_of
+
+    stretch = {name: getattr(arguments, name) for name in ("from_s", "to_s")}
+    return [*words_of(stretch), *mapping_of(arguments).words]
 
 
-def take_mapping(arguments: argparse.Namespace) -> None:
-    """Fill in what the file of `--mapping` says and nobody typed.
+def mapping_of(arguments: argparse.Namespace) -> "ExportMapping":
+    """Return how exports are read: what was typed, and beside it what the file of `--mapping` says.
 
     Raises:
         InputError: a fault in that file.
     """
-    from workbench.imports.mapping_file import read_mapping_file
+    from config.loading import validate
+    from workbench.imports.export_mapping import ExportMapping, read_mapping_file
 
-    if arguments.mapping is None:
-        return
-    for name, value in read_mapping_file(arguments.mapping).model_dump().items():
-        if not getattr(arguments, name):
-            setattr(arguments, name, list(value) if isinstance(value, tuple) else value)
-    arguments.mapping = None
+    written = {} if arguments.mapping is None else read_mapping_file(arguments.mapping).model_dump()
+    typed = {name: value for name in ExportMapping.model_fields if (value := getattr(arguments, name))}
+    return validate(ExportMapping, written | typed, "--column")
 
 
 def read_any(path: Path, arguments: argparse.Namespace, stroke_m: float | None) -> "Recording":
@@ -135,18 +125,17 @@ def read_any(path: Path, arguments: argparse.Namespace, stroke_m: float | None) 
     """
     from config.recording import Recording
 
-    take_mapping(arguments)
+    mapping = mapping_of(arguments)
     size = f", {path.stat().st_size / 1e6:.0f} MB" if path.is_file() and path.stat().st_size > LARGE_FILE_BYTES else ""
     if size:
         print(f"reading {path}{size}", file=sys.stderr, flush=True)
-    if arguments.column:
+    if mapping.column:
         with at_work(arguments.command, f"reading {path}{size}") as progress:
-            recording = read_mapped(path, arguments, stroke_m, progress)
-        tell(f"positioner {arguments.command}: {path}", recording, arguments.stroke_m or stroke_m)
+            recording = mapping.read(path, stroke_m, progress)
+        tell(f"positioner {arguments.command}: {path}", recording, mapping.stroke_m or stroke_m)
         return _stretch(recording, arguments)
-    for name in BESIDES:
-        if getattr(arguments, name):
-            raise InputError(f"--{name.replace('_', '-')}", "goes with --column; a recording is in SI units")
+    if mapping.words:
+        raise InputError(mapping.words[0], "goes with --column; a recording is in SI units")
     with at_work(arguments.command, f"reading {path}{size}"):
         try:
             recording = Recording.read(path)
@@ -191,40 +180,6 @@ def _stretch(recording: "Recording", arguments: argparse.Namespace) -> "Recordin
             f"{recording.time_s.max():g}",
         )
     return replace(recording, columns={name: column[kept] for name, column in recording.columns.items()})
-
-
-def read_mapped(
-    path: Path,
-    arguments: argparse.Namespace,
-    stroke_m: float | None,
-    progress: "Callable[[str, float], None] | None" = None,
-) -> "Recording":
-    """Read an export by the mapping of a command line; `progress` is called with what is done, and how much of it.
-
-    Raises:
-        InputError: as `read_export`; a stroke that is not positive.
-    """
-    from workbench.imports.column_mapping import read_mapping
-    from workbench.imports.historian_export import read_export
-
-    if arguments.stroke_m is not None and not arguments.stroke_m > 0.0:
-        raise InputError("--stroke-m", f"must be positive, it is {arguments.stroke_m:g}")
-    sources = read_mapping(arguments.column, arguments.period_s)
-    range_pa = None if arguments.range_pa is None else (arguments.range_pa[0], arguments.range_pa[1])
-    return read_export(path, sources, arguments.stroke_m or stroke_m, range_pa, export_options(arguments), progress)
-
-
-def export_options(arguments: argparse.Namespace) -> "ExportOptions":
-    """Return how an export is read beyond its columns.
-
-    Raises:
-        InputError: a status that says nothing.
-    """
-    from workbench.imports.column_mapping import ExportOptions, read_status
-
-    return ExportOptions(
-        arguments.decimal, arguments.time_format, read_status(arguments.status), arguments.sheet, arguments.period_s
-    )
 
 
 def tell(who: str, recording: "Recording", stroke_m: float | None) -> None:
