@@ -45,7 +45,7 @@ def run(arguments: argparse.Namespace) -> int:
         words = in_words(name, value, values) or BY_NAME[name].text
         print(f"{name:18} {value:<12.6g} {words}")
     for day in days:
-        _print_day(day)
+        print_day(day)
     return 0
 
 
@@ -65,7 +65,7 @@ def _days(arguments: argparse.Namespace) -> "tuple[OperationDay, ...]":
     )
 
 
-def _print_day(day: "OperationDay") -> None:
+def print_day(day: "OperationDay") -> None:
     """Print a day: a line, and its histograms."""
 
     from positioner.daemon.health.daily_figures import DAY_S, DEVIATIONS, OPENINGS

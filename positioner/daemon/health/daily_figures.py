@@ -20,12 +20,12 @@ from bisect import bisect_right
 from dataclasses import dataclass
 from math import isfinite, nan
 from statistics import median
-from typing import Annotated, NamedTuple
+from typing import Annotated, Any, NamedTuple
 
 from pydantic import Field
 
 from config.codes import S3, EndTrend, Mode
-from config.loading import Many, NonNegative, Schema
+from config.loading import Many, Schema
 from config.travel import Travel
 from positioner.control.controller_memory import Decision
 from positioner.control.sample import Sample
@@ -49,13 +49,22 @@ ENDS = 0.02
 """Of the stroke from its ends: there a stop holds the stem, and no balance."""
 SURROUNDINGS_PA = 101_325.0
 
-Count = Annotated[int, Field(ge=0, le=2**53)]
+LAST_DAY = 2_932_896
+"""31 December 9999: the last that is a date."""
+MOST = 2**53
+"""Of what is counted and summed: each up to it is a number of its own."""
+Count = Annotated[int, Field(ge=0, le=MOST)]
+
+
+def _bins(edges: tuple[float, ...]) -> Any:
+    """Require a bin on each side of each edge."""
+    return Field(min_length=len(edges) + 1, max_length=len(edges) + 1)
 
 
 class Mean(Schema):
     """A sum and how many."""
 
-    total: float = 0.0
+    total: Annotated[float, Field(ge=-MOST, le=MOST)] = 0.0
     count: Count = 0
 
     def with_one(self, value: float) -> "Mean":
@@ -71,12 +80,12 @@ class Mean(Schema):
 class OperationDay(Schema):
     """One day; counts are seconds, but for the spans, which are turns."""
 
-    day: Count
+    day: Annotated[int, Field(ge=0, le=LAST_DAY)]
     """Since 1970, UTC."""
     seconds: Count = 0
-    opening: Many[Count] = (0,) * (len(OPENINGS) + 1)
-    deviation: Many[Count] = (0,) * (len(DEVIATIONS) + 1)
-    span: Many[Count] = (0,) * (len(SPANS) + 1)
+    opening: Annotated[Many[Count], _bins(OPENINGS)] = (0,) * (len(OPENINGS) + 1)
+    deviation: Annotated[Many[Count], _bins(DEVIATIONS)] = (0,) * (len(DEVIATIONS) + 1)
+    span: Annotated[Many[Count], _bins(SPANS)] = (0,) * (len(SPANS) + 1)
     saturated: Count = 0
     away: Mean = Mean()
     """|r - h| in automatic."""
@@ -85,7 +94,7 @@ class OperationDay(Schema):
     course: Mean = Mean()
     short: Mean = Mean()
     short_high: Mean = Mean()
-    exhausted: NonNegative = 0.0
+    exhausted: Annotated[float, Field(ge=0, le=MOST)] = 0.0
     """Volumes."""
 
     @property

@@ -2,16 +2,23 @@
 
 import json
 import logging
+import time
+from collections.abc import Iterator
 from dataclasses import replace
 from pathlib import Path
+from typing import Any
 
 import pytest
 
 from config.errors import InputError
+from positioner.cli.health import print_day
 from positioner.daemon.health import Health, HealthKeeper, HealthRecord, StoredHealth
-from positioner.daemon.health.health_file import KeptHealth, read_record, write_record
+from positioner.daemon.health.daily_figures import DAY_S, OperationDay
+from positioner.daemon.health.health_file import KeptAlarm, KeptHealth, KeptMore, kept_days, read_record, write_record
+from positioner.daemon.health.valve_conditions import KeptConditions
 from positioner.daemon.kept_alone import HEALTH, valve_file_path
 from positioner.daemon.snapshot import Snapshot
+from tests.daemon.health.test_valve_health import Panel
 
 KEPT = HealthRecord(12.5, 340, 0.25, 17, 22e3)
 SCALES = {"device.map.command_pa.scale": "20.0", "device.map.command_pa.offset": "0.0"}
@@ -104,6 +111,45 @@ def test_garbage_is_put_aside_and_told_in_one_line(tmp_path: Path, text: bytes) 
     assert problem is not None
     assert "\n" not in problem
     assert (tmp_path / "valve.json.unreadable").read_bytes() == text
+
+
+def ways_into(content: object, path: tuple[str | int, ...] = ()) -> Iterator[tuple[str | int, ...]]:
+    """Yield the way to everything that a kept file holds; of a list the last."""
+    table = content if isinstance(content, dict) else {-1: content[-1]} if isinstance(content, list) and content else {}
+    for key, value in table.items():
+        yield (*path, key)
+        yield from ways_into(value, (*path, key))
+
+
+def spoilt_at(content: Any, path: tuple[str | int, ...], value: object) -> str:
+    copied = json.loads(json.dumps(content))
+    inside = copied
+    for key in path[:-1]:
+        inside = inside[key]
+    inside[path[-1]] = value
+    return json.dumps(copied)
+
+
+ODD = (float("inf"), float("nan"), 10**400, 2**52, 1e308, "1", None, [1])
+
+
+def test_whatever_stands_in_the_file_is_put_aside_or_gone_on_with_and_served(tmp_path: Path) -> None:
+    """Each value, list and table of it is replaced by what it is not: a histogram with a bin less ended the daemon."""
+    path, panel = valve_file_path(tmp_path, "FV-1", HEALTH), Panel()
+    days = tuple(OperationDay(day=int(each // DAY_S)) for each in (1e9, time.time()))
+    alarm = KeptAlarm(holds=True, acknowledged=False, since_s=1e9, shelved_until_s=0.0)
+    conditions = KeptConditions(raised=("FRICTION_HIGH",), spring_pa_per_m=8e5, tested_s=1e9)
+    write_record(
+        path, "FV-1", KEPT, SCALES, KeptMore(conditions=conditions, days=days, alarms={"MODEL_CHANGED": alarm})
+    )
+    content = json.loads(path.read_text())
+    for at in ways_into(content):
+        for odd in ODD:
+            path.write_text(spoilt_at(content, at, odd))
+            panel.go_on_with(StoredHealth.in_folder(tmp_path, "FV-1", SCALES))
+            assert read_record(path, "FV-1", SCALES).problem is None, (at, odd)
+            for day in kept_days(path, "FV-1"):
+                print_day(day)
 
 
 def test_two_valves_whatever_their_names_have_a_file_each(tmp_path: Path) -> None:

@@ -21,7 +21,7 @@ from positioner.control.requests import Requests
 from positioner.control.sample import Sample
 from positioner.control.travel.cutoffs import LOW
 from positioner.daemon.alarms.alarm_list import AlarmList
-from positioner.daemon.health import Health, ne107_condition
+from positioner.daemon.health import Health, HealthKeeper, StoredHealth, ne107_condition
 from positioner.daemon.health.ne107 import Ne107Condition
 from positioner.daemon.health.valve_health import HealthSettings
 from positioner.daemon.supervisory_registers import SupervisoryRegisters
@@ -70,6 +70,16 @@ class Panel:
         for _ in range(round(for_s / 1e-3)):
             self.cycle.once()
         self.health.look(self.cycle.snapshot.sample, self.cycle.snapshot.decision, 1e9)
+
+    def go_on_with(self, stored: StoredHealth) -> None:
+        """Begin anew with what was kept, look twice at a command that stands, serve every register, and keep it."""
+        self.health = self.cycle.health = Health(self.health.settings, stored.kept.record)
+        keeper = HealthKeeper(self.health, lambda: self.cycle.snapshot, "FV-1", stored, alarms=self.alarms)
+        for _ in range(2):
+            keeper.check()
+        for name in BY_NAME:
+            self.get(name)
+        keeper.stop()
 
     def identify(self) -> None:
         for name in ("eta_1", "eta_2", "eta_3"):
