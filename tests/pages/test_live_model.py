@@ -8,11 +8,13 @@ from config.errors import InputError
 from config.recording import Column, Recording
 from config.valve_file import EffectTable, ValveFile
 from tests.pages.laid_out import hidden
+from tests.workbench.hand_made import LIBRARY
+from tests.workbench.valves import with_effect
 from webpage.plot_colours import LIGHT
 from webpage.units import Units
 from workbench.compare.comparison import compare
 from workbench.data.record import Record, ready
-from workbench.page.live_model import LiveModel
+from workbench.page.live_model import STRONGEST, LiveModel
 from workbench.page.opening import Opened
 from workbench.page.time_figure import LINES, TimeFigure, Window, window_of
 
@@ -84,6 +86,19 @@ def test_a_slider_goes_as_far_as_such_a_valve_may_and_a_number_as_far_as_is_phys
             live.put(live.parameters[name], value)
     assert live.undo()
     assert live.value(static) == pytest.approx(1000.0 * valve.static_n / valve.coulomb_n)
+
+
+@pytest.mark.parametrize(
+    ("name", "key"), [("end_stop", "lower_m"), ("supply_limit", "supply_pa"), ("backlash", "width_m")]
+)
+def test_a_slider_reaches_no_stop_or_supply_that_no_valve_has(name: str, key: str) -> None:
+    """Where an effect vanishes at the end of what is physical, its slider went there: a stop 100 m away."""
+    valve = hidden().base.valve
+    declared = {key: each.starts_for(valve)[-1] for key, each in LIBRARY[name].parameters.items()}
+    live = LiveModel(record(), with_effect(hidden().base, name, **declared))
+    longest = valve.stroke_m if key.endswith("_m") else valve.spring_n_per_m * valve.stroke_m / valve.diaphragm_area_m2
+    moved = live.parameters[f"{name}.{key}"]
+    assert max(abs(live.value_at(moved, share)) for share in (0.0, 1.0)) <= STRONGEST * longest
 
 
 def test_an_effect_switched_off_is_the_valve_without_it() -> None:

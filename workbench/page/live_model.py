@@ -16,6 +16,7 @@ from config.errors import InputError
 from config.recording import Column
 from config.valve_file import ValveFile
 from sim.composition import BASE, Composition
+from sim.effect import Parameter as Declared
 from sim.karnopp import Vector
 from workbench.compare.comparison import Comparison, compare_record
 from workbench.compare.friction_balance import Forces, forces, join_forces
@@ -217,20 +218,25 @@ class LiveModel:
             low, high = value / SLIDER_FACTOR, value * SLIDER_FACTOR
         else:
             declared = next(each for each in self._composition.effects if each.name == effect).parameters[key]
-            low, high = _reach(parameter.starts, declared.off, positive=parameter.least > 0.0)
+            low, high = _reach(declared, parameter.starts)
         low, high = min(low, value), max(high, value)
         return replace(parameter, least=max(low, parameter.least), most=min(high, parameter.most))
 
 
-def _reach(starts: Sequence[float], off: float | None, *, positive: bool) -> tuple[float, float]:
-    """Return how far a slider reaches about the starts of a search; from `off` where the effect vanishes somewhere.
+def _reach(declared: Declared, starts: Sequence[float]) -> tuple[float, float]:
+    """Return how far a slider reaches about the starts of a search, on both sides of where the effect vanishes.
 
-    >>> _reach((-0.1, 0.1, 0.5), 0.0, positive=False), _reach((0.1, 10.0), None, positive=True)
-    ((-2.0, 2.0), (0.025, 40.0))
+    One that vanishes at an end of what is physical, as a stop a hundred metres away, is reached by its switch alone.
+
+    >>> _reach(Declared("", -1e9, 1e9, off=0.0), (-0.1, 0.1, 0.5)), _reach(Declared("", -9.0, 9.0, off=9.0), (0.0, 0.1))
+    ((-2.0, 2.0), (-0.4, 0.4))
+    >>> _reach(Declared("", 1e-9, 1e9), (0.1, 10.0))
+    (0.025, 40.0)
     """
-    if positive:
+    if declared.least > 0.0:
         return min(starts) / STRONGEST, max(starts) * STRONGEST
-    middle = 0.0 if off is None else off
+    off = declared.off
+    middle = 0.0 if off is None or not declared.least < off < declared.most else off
     far = STRONGEST * max(abs(each - middle) for each in starts)
     return middle - far, middle + far
 
