@@ -12,10 +12,10 @@ from math import nan
 import numpy as np
 
 from config.codes import InhibitReason
+from positioner.control.laws.slides.now import Now
 from positioner.control.laws.slides.slide_balance import Balance
 from positioner.control.laws.slides.slide_law import SlideSettings, let_go, stepped
 from positioner.control.laws.slides.slide_memory import SlideMemory
-from positioner.control.laws.slides.stem_observation import StemObservation
 from positioner.estimation.acceptance import Ratios
 from positioner.estimation.landings.breakaway_distance import BreakawayDistance, Interval
 from positioner.estimation.landings.landing_detector import SlideOutcome
@@ -123,6 +123,28 @@ class ScriptedStem:
         """Let a stuck stem answer the command in force."""
         self.stuck, self.answered_pa = False, nan
 
+    def now(
+        self,
+        reference_m: float,
+        position_m: float,
+        *,
+        rest: Rest | None = None,
+        outcome: SlideOutcome | None = None,
+        waits_for: InhibitReason = InhibitReason.NOTHING,
+    ) -> Now:
+        """Return what a step is decided from, of a stem that is seen somewhere, m."""
+        return Now(
+            now_s=self.now_s,
+            position_m=position_m,
+            rest=rest,
+            quantum_m=0.0,
+            reference_m=reference_m,
+            balance=self.balance,
+            bounds=self.settings,
+            outcome=outcome,
+            waits_for=waits_for,
+        )
+
     def once(self, reference_m: float) -> None:
         """Let one step at rest go by, with what the last change of the command did."""
         self.now_s += STEP_S
@@ -130,8 +152,7 @@ class ScriptedStem:
         if outcome is not None and outcome.landing:
             self.landings.insert(0, outcome)
         rest = Rest(self.position_m, 1e-7, 1e-7, 100, 0.1)
-        seen = StemObservation(now_s=self.now_s, position_m=self.position_m, rest=rest, quantum_m=0.0, outcome=outcome)
-        self.memory = stepped(self.memory, seen, reference_m, self.balance, self.settings)
+        self.memory = stepped(self.memory, self.now(reference_m, self.position_m, rest=rest, outcome=outcome))
         self.states.append((type(before.state), type(self.memory.state)))
         self.commands_pa.append(self.memory.command_pa)
 
@@ -139,10 +160,7 @@ class ScriptedStem:
         """Let one step go by in which the stem is seen somewhere, on its way."""
         self.now_s += STEP_S
         before = self.memory
-        seen = StemObservation(
-            now_s=self.now_s, position_m=position_m, rest=None, quantum_m=0.0, outcome=None, waits_for=waits_for
-        )
-        self.memory = stepped(self.memory, seen, reference_m, self.balance, self.settings)
+        self.memory = stepped(self.memory, self.now(reference_m, position_m, waits_for=waits_for))
         self.states.append((type(before.state), type(self.memory.state)))
 
     def moved_to(self, reference_m: float, steps: int = 60) -> int:

@@ -10,6 +10,7 @@ import pytest
 
 from config.codes import InhibitReason
 from positioner.control.laws.slides import transitions
+from positioner.control.laws.slides.now import Now
 from positioner.control.laws.slides.slide_law import SlideLaw
 from positioner.control.laws.slides.slide_memory import SlideMemory
 from positioner.control.laws.slides.states import STATES, Idle, Out, Presliding, Stuck, Waiting
@@ -127,7 +128,7 @@ def test_every_rule_of_the_table_is_followed_and_no_other_way_is_gone(monkeypatc
         allowed |= {(of, to) for of in rule.of for to in rule.to}
 
     def counted(rule: transitions.Rule) -> transitions.Rule:
-        def follow(memory: SlideMemory, now: transitions.Now) -> SlideMemory | None:
+        def follow(memory: SlideMemory, now: Now) -> SlideMemory | None:
             after = rule.follow(memory, now)
             if after is not None:
                 followed[rule.when] += 1

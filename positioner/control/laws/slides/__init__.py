@@ -7,7 +7,7 @@
     teaching            what a slide taught of break-away
     slide_memory        what is remembered beside the state: the move, the last slide, what excursions have cost
     slide_balance       where a slide lands, and how break-away goes over the travel
-    stem_observation    what one step sees of the stem, also of an extended valve's
+    now                 what one step is decided from
     reference_course    does the reference rest, or take back what would be corrected
     slide_bounds        what the site sets, and the thresholds
     certificate         what can be proved of it on an identified valve

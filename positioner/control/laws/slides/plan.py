@@ -25,11 +25,11 @@ from dataclasses import dataclass
 from typing import NamedTuple
 
 from config.codes import InhibitReason
-from positioner.control.laws.slides.reference_course import ReferenceCourse
-from positioner.control.laws.slides.slide_balance import Balance
+from positioner.control.laws.slides.now import Now
 from positioner.control.laws.slides.slide_bounds import SlideBounds
-from positioner.control.laws.slides.slide_memory import Anchor
-from positioner.estimation.landings.breakaway_distance import BreakawayDistance, Interval, Local
+from positioner.control.laws.slides.slide_memory import SlideMemory
+from positioner.control.laws.slides.states import Slide
+from positioner.estimation.landings.breakaway_distance import Interval
 from positioner.estimation.landings.landing_detector import VISIBLE
 from positioner.estimation.landings.packing_compliance import compliance
 
@@ -42,42 +42,53 @@ class Excursion(NamedTuple):
     beyond_m: float
 
 
-@dataclass(frozen=True, slots=True, kw_only=True)
+@dataclass(frozen=True, slots=True)
 class Plan:
-    """What is needed to plan a move to a target, m, from where the stem stands."""
+    """A move to the reference from where a stem stands, m, by what is remembered."""
 
-    bounds: SlideBounds
-    balance: Balance
-    distances: BreakawayDistance
-    local: Local
-    """Of the target."""
-    anchor: Anchor | None
+    now: Now
+    memory: SlideMemory
     from_m: float
-    target_m: float
-    quantum_m: float
-    preslides: bool
-    """Whether the stem may still be moved directly."""
-    surely: bool
-    """Whether the next slide goes as far as has broken loose: what may do has been tried."""
+
+    @classmethod
+    def at_rest(cls, memory: SlideMemory, now: Now) -> "Plan":
+        """Return that of a stem at rest: it begins where the last slide ended, whatever the packing has given since."""
+        return cls(now, memory, now.at_rest.position_m if memory.anchor is None else memory.anchor.position_m)
+
+    @property
+    def surely(self) -> bool:
+        """Whether the next slide goes as far as has broken loose: what may do has been tried."""
+        return self.memory.move.held or self.memory.move.landed >= self.now.bounds.thresholds.tried
 
     def interval(self, direction: int, *, turning: bool) -> Interval:
-        """Return the break-away distance of a slide at the target."""
-        return self.distances.at(direction, turning=turning, local=self.local)
+        """Return the break-away distance of a slide at the reference."""
+        assert self.memory.distances is not None, "known since the first step"
+        return self.memory.distances.at(direction, turning=turning, local=self.now.local)
 
     def turns(self, direction: int) -> bool:
         """Whether a slide in a direction would turn round; where that is not known, it does."""
-        return self.anchor is None or self.anchor.turns(direction)
+        return self.memory.anchor is None or self.memory.anchor.turns(direction)
+
+    def slide(self, to_m: float, direction: int) -> Slide:
+        """Return the slide to a place, m."""
+        turning = None if self.memory.anchor is None else self.turns(direction)
+        return Slide(from_m=self.from_m, to_m=to_m, direction=direction, turning=turning)
 
     def breaks_loose_m(self, direction: int, *, turning: bool) -> float:
         """Return how far a slide must be sent to break loose, m, be it seen for a slide or not."""
         interval = self.interval(direction, turning=turning)
         sure_m = interval.sure_m
-        return sure_m if self.surely and sure_m <= self.bounds.excursion_limit_m else interval.likely_m
+        return sure_m if self.surely and sure_m <= self.now.bounds.excursion_limit_m else interval.likely_m
+
+    @property
+    def rounded_m(self) -> float:
+        """By how much sensor and device round where a slide lands, m."""
+        return self.now.bounds.thresholds.rounded_quanta * self.now.quantum_m + self.now.beside_m
 
     @property
     def shortest_m(self) -> float:
         """The shortest slide that is sent, m: it is seen for one, however it is rounded."""
-        return shortest_seen_m(self.bounds) + self.rounded_m
+        return shortest_seen_m(self.now.bounds) + self.rounded_m
 
     def way_m(self, direction: int, *, turning: bool | None = None) -> float:
         """Return how far a slide must be sent, m; by default as it would go from where the stem stands."""
@@ -86,85 +97,80 @@ class Plan:
 
     def back_m(self, direction: int) -> float:
         """Return how far beyond its target a stem is sent, m, that is to come back by a slide in a direction."""
-        turning_m = self.bounds.thresholds.return_margin * self.breaks_loose_m(direction, turning=True)
+        turning_m = self.now.bounds.thresholds.return_margin * self.breaks_loose_m(direction, turning=True)
         return max(turning_m + self.rounded_m, self.shortest_m)
 
-    def preslid_pa(self, from_m: float, from_pa: float) -> float | None:
-        """Return the pressure under which a packing gives way from a place, m, under a pressure, to the target, Pa.
+    def preslid_pa(self) -> float | None:
+        """Return the pressure under which the packing of a stem at rest gives way to the target, Pa.
 
         None: not so far, or not for sure. It costs no travel, and one rest where an excursion takes two: it is better
         wherever it leaves no more than a share of the error. The spring of the stuck stem is 1/c.
         """
-        error_m, thresholds = self.target_m - from_m, self.bounds.thresholds
-        s = 1 if error_m > 0 else -1
-        if not self.preslides or abs(error_m) > thresholds.longest_giving * self.bounds.stroke_m:
+        now, thresholds, s = self.now, self.now.bounds.thresholds, self.now.side
+        longest_m = thresholds.longest_giving * now.bounds.stroke_m
+        if self.memory.move.preslid >= thresholds.most_preslid or abs(now.error_m) > longest_m:
             return None
-        gives = compliance(self.balance.held, s)
+        gives = compliance(now.balance.held, s)
         if gives is None or gives.spread > thresholds.preslid_within:
             return None
-        command_pa = from_pa + error_m / gives.m_per_pa
+        command_pa = self.memory.command_pa + now.error_m / gives.m_per_pa
         held_m = thresholds.presliding * self.interval(s, turning=False).held_m
-        holds = s * (command_pa - self.balance.pressure_pa(self.target_m, s)) <= held_m * -self.balance.ratios.b_over_c
-        return command_pa if holds and self.bounds.allows(command_pa) else None
+        holds = s * self.ahead_m(command_pa, s) <= held_m
+        return command_pa if holds and now.bounds.allows(command_pa) else None
 
-    def excursions(self, *, begun: bool) -> tuple[Excursion, Excursion]:
+    def ahead_m(self, command_pa: float, direction: int) -> float:
+        """Return how far beyond its target a command holds a slide in balance, m, signed."""
+        balance = self.now.balance
+        return (command_pa - balance.pressure_pa(self.now.reference_m, direction)) / -balance.ratios.b_over_c
+
+    def excursions(self) -> tuple[Excursion, Excursion]:
         """Return the excursions by either side, first the one that goes less far beyond the move.
 
         The move is the way between stem and target. A stem that a slide of the move has brought there is off that way
-        already (begun), and while references keep coming there is none: then the target alone counts.
+        already, and while references keep coming there is none: then the target alone counts.
         """
-        error_m = self.target_m - self.from_m
+        now, course = self.now, self.memory.course
+        begun = self.memory.move.landed > 0 or bool(course and course.changes_m)
+        error_m = now.reference_m - self.from_m
         s, way_m = (1 if error_m > 0 else -1), abs(error_m)
         on_m = max(self.back_m(-s), self.way_m(s) - way_m)
         round_m = max(self.back_m(s), self.way_m(-s) + way_m)
         around_m = round_m if begun else round_m - way_m
-        by_its_side = Excursion(direction=s, by_m=self.target_m + s * on_m, beyond_m=on_m)
-        by_the_other = Excursion(direction=-s, by_m=self.target_m - s * round_m, beyond_m=around_m)
-        longer = self.bounds.thresholds.other_side
+        by_its_side = Excursion(direction=s, by_m=now.reference_m + s * on_m, beyond_m=on_m)
+        by_the_other = Excursion(direction=-s, by_m=now.reference_m - s * round_m, beyond_m=around_m)
+        longer = now.bounds.thresholds.other_side
         return (by_its_side, by_the_other) if on_m <= longer * around_m else (by_the_other, by_its_side)
 
     def barred(self, each: Excursion) -> InhibitReason:
         """Return which bound of the site bars an excursion; `NOTHING`: none does."""
-        low_m, high_m = self.balance.stops_m
-        if each.beyond_m > self.bounds.excursion_limit_m or not low_m <= each.by_m <= high_m:
+        bounds, balance, (low_m, high_m) = self.now.bounds, self.now.balance, self.now.balance.stops_m
+        if each.beyond_m > bounds.excursion_limit_m or not low_m <= each.by_m <= high_m:
             return InhibitReason.EXCURSION_BEYOND_LIMIT
-        both_pa = (
-            self.balance.pressure_pa(each.by_m, each.direction),
-            self.balance.pressure_pa(self.target_m, -each.direction),
-        )
-        allowed = all(self.bounds.allows(each_pa) for each_pa in both_pa)
+        both = ((each.by_m, each.direction), (self.now.reference_m, -each.direction))
+        allowed = all(bounds.allows(balance.pressure_pa(*to)) for to in both)
         return InhibitReason.NOTHING if allowed else InhibitReason.LAW_BEYOND_LIMITS
 
-    def lead_m(self, course: ReferenceCourse, now_s: float, direction: int) -> float:
+    def lead_m(self, direction: int) -> float:
         """Return how far ahead of a ramp to land, m, where the site's bounds let it."""
-        lead_m = course.lead_m(now_s, self.way_m(direction))
-        to_m, (low_m, high_m) = self.target_m + lead_m, self.balance.stops_m
-        ahead = 0.0 < direction * lead_m <= self.bounds.excursion_limit_m and low_m <= to_m <= high_m
-        return lead_m if ahead and self.bounds.allows(self.balance.pressure_pa(to_m, direction)) else 0.0
+        now, course = self.now, self.memory.course
+        lead_m = 0.0 if course is None else course.lead_m(now.now_s, self.way_m(direction))
+        to_m, (low_m, high_m) = now.reference_m + lead_m, now.balance.stops_m
+        ahead = 0.0 < direction * lead_m <= now.bounds.excursion_limit_m and low_m <= to_m <= high_m
+        return lead_m if ahead and now.bounds.allows(now.balance.pressure_pa(to_m, direction)) else 0.0
 
-    def back_pa(self, direction: int, position_m: float, goes_on_m: float) -> float:
-        """Return what to hold, Pa, if something interrupts the first of two slides, in a direction, at a position.
+    def back_pa(self, direction: int, goes_on_m: float) -> float:
+        """Return what to hold, Pa, if something interrupts the first of two slides, in a direction.
 
         From beyond a distance that has broken loose the stem comes back to its target. From nearer it might not break
         loose: it goes as far beyond the target on the other side as it lacks, if that is nearer than where it is.
         """
-        s, interval = direction, self.interval(-direction, turning=True)
-        beyond_m = s * (position_m + goes_on_m - self.target_m)
-        lacks_m = self.bounds.thresholds.return_margin * interval.sure_m - beyond_m
-        to_m = self.target_m - s * max(0.0, lacks_m) if beyond_m > lacks_m else self.target_m
-        return self.bounds.allowed_pa(self.balance.slide_pa(position_m, to_m, -s))
-
-    @property
-    def rounded_m(self) -> float:
-        """By how much sensor and device round where a slide lands, m."""
-        return self.bounds.thresholds.rounded_quanta * self.quantum_m + beside_m(self.bounds, self.balance)
+        s, interval, target_m = direction, self.interval(-direction, turning=True), self.now.reference_m
+        beyond_m = s * (self.from_m + goes_on_m - target_m)
+        lacks_m = self.now.bounds.thresholds.return_margin * interval.sure_m - beyond_m
+        to_m = target_m - s * max(0.0, lacks_m) if beyond_m > lacks_m else target_m
+        return self.now.bounds.allowed_pa(self.now.balance.slide_pa(self.from_m, to_m, -s))
 
 
 def shortest_seen_m(bounds: SlideBounds) -> float:
     """Return how far a stem must go to be seen to slide, m: else its packing may have given way."""
     return VISIBLE * bounds.stroke_m
-
-
-def beside_m(bounds: SlideBounds, balance: Balance) -> float:
-    """Return how far beside its aim a slide may land, m, where the device is told whole numbers: by half a step."""
-    return 0.5 * bounds.command_step_pa / -balance.ratios.b_over_c

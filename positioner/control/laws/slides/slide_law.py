@@ -14,14 +14,14 @@ from typing import ClassVar, Self
 from config.codes import InhibitReason
 from config.daemon_file import DaemonFile
 from positioner.control.laws.boundary import Seen
+from positioner.control.laws.slides.now import Now
 from positioner.control.laws.slides.reference_course import ReferenceCourse
 from positioner.control.laws.slides.slide_balance import Balance
 from positioner.control.laws.slides.slide_bounds import DAY_S, SlideBounds
 from positioner.control.laws.slides.slide_memory import Move, SlideMemory
 from positioner.control.laws.slides.states import Idle, Out, Watching
-from positioner.control.laws.slides.stem_observation import StemObservation, observed
 from positioner.control.laws.slides.teaching import after_outcome
-from positioner.control.laws.slides.transitions import Now, after
+from positioner.control.laws.slides.transitions import after
 from positioner.control.valve_knowledge import ValveKnowledge
 from positioner.estimation.acceptance import Ratios
 from positioner.estimation.landings.breakaway_distance import BreakawayDistance
@@ -84,7 +84,7 @@ class SlideLaw:
             memory = let_go(memory, seen.command_pa, settings)
         elif seen.usable:
             balance = balance_after(balance, seen.ratios, seen, settings.stroke_m)
-            memory = stepped(memory, observed(seen), seen.reference_m, balance, settings)
+            memory = stepped(memory, Now.of(seen, balance, settings))
         if memory is self.memory and settings is self.settings and balance is self.balance:
             return self
         return SlideLaw(settings, memory, balance)
@@ -116,24 +116,20 @@ def let_go(memory: SlideMemory, command_pa: float, bounds: SlideBounds) -> Slide
     )
 
 
-def stepped(
-    memory: SlideMemory, seen: StemObservation, reference_m: float, balance: Balance, bounds: SlideBounds
-) -> SlideMemory:
+def stepped(memory: SlideMemory, now: Now) -> SlideMemory:
     """Return what is remembered after one step in which the law commands."""
-    distances = memory.distances
-    if distances is None:
-        distances = first_distances(balance, bounds)
-        memory = replace(memory, distances=distances)
+    bounds, reference_m = now.bounds, now.reference_m
+    if memory.distances is None:
+        memory = replace(memory, distances=first_distances(now.balance, bounds))
     if isinstance(memory.state, Watching):
         memory = replace(memory, state=Idle())
     if memory.course is None:
-        memory = replace(memory, course=ReferenceCourse(reference_m, seen.now_s))
+        memory = replace(memory, course=ReferenceCourse(reference_m, now.now_s))
     elif reference_m != memory.course.value_m:
         move = Move(bounds.thresholds.most_slides)
-        memory = replace(memory, course=memory.course.after(seen.now_s, reference_m), move=move)
-    now = Now(seen, reference_m, balance, bounds)
-    if seen.outcome is not None:
-        memory = after_outcome(memory, seen.outcome, now)
+        memory = replace(memory, course=memory.course.after(now.now_s, reference_m), move=move)
+    if now.outcome is not None:
+        memory = after_outcome(memory, now.outcome, now)
     return after(memory, now)
 
 

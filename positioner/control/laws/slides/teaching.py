@@ -11,8 +11,8 @@ grown: then those that held before it say nothing either, for they were sent by 
 """
 
 from dataclasses import replace
-from typing import TYPE_CHECKING
 
+from positioner.control.laws.slides.now import Now
 from positioner.control.laws.slides.plan import shortest_seen_m
 from positioner.control.laws.slides.slide_bounds import SlideBounds
 from positioner.control.laws.slides.slide_memory import Anchor, Move, Row, SlideMemory
@@ -20,11 +20,8 @@ from positioner.control.laws.slides.states import Presliding, Slide, slide_of
 from positioner.estimation.landings.breakaway_distance import Went
 from positioner.estimation.landings.landing_detector import SlideOutcome
 
-if TYPE_CHECKING:
-    from positioner.control.laws.slides.transitions import Now
 
-
-def after_outcome(memory: SlideMemory, outcome: SlideOutcome, now: "Now") -> SlideMemory:
+def after_outcome(memory: SlideMemory, outcome: SlideOutcome, now: Now) -> SlideMemory:
     """Return the memory after what a change of the command did: break-away, and where the stem stands."""
     state = memory.state
     if isinstance(state, Presliding):
@@ -32,7 +29,7 @@ def after_outcome(memory: SlideMemory, outcome: SlideOutcome, now: "Now") -> Sli
     return _after_slide(memory, outcome, now)
 
 
-def _after_slide(memory: SlideMemory, outcome: SlideOutcome, now: "Now") -> SlideMemory:
+def _after_slide(memory: SlideMemory, outcome: SlideOutcome, now: Now) -> SlideMemory:
     thresholds, stroke_m = now.bounds.thresholds, now.bounds.stroke_m
     s, to_m, slide = outcome.direction, outcome.position_m, slide_of(memory.state)
     if outcome.moved and memory.row is not None and memory.row.stuck:
@@ -42,7 +39,7 @@ def _after_slide(memory: SlideMemory, outcome: SlideOutcome, now: "Now") -> Slid
     if slide is None:
         return memory
     way_m, went_m, missed_m = slide.way_m, slide.went_m(to_m), abs(slide.to_m - to_m)
-    near_m = max(thresholds.missed * way_m, now.seen.quantum_m)
+    near_m = max(thresholds.missed * way_m, now.quantum_m)
     half_way = went_m > thresholds.gave_way * way_m
     moved = missed_m <= near_m or abs(to_m - outcome.from_m) > thresholds.longest_giving * stroke_m or half_way
     if not moved:
@@ -58,14 +55,14 @@ def _after_slide(memory: SlideMemory, outcome: SlideOutcome, now: "Now") -> Slid
     return _taught(landed, slide, Went(way_m, went_m, moved=True, arrived=not elsewhere), now)
 
 
-def _went_elsewhere(slide: Slide, went_m: float, near_m: float, now: "Now") -> bool:
+def _went_elsewhere(slide: Slide, went_m: float, near_m: float, now: Now) -> bool:
     """Whether a slide did not arrive: far short of its way, or off by more than is near, the second time on end."""
     way_m, missed_m = slide.way_m, abs(slide.way_m - went_m)
     far_short = way_m - went_m > now.bounds.thresholds.far_short * way_m
     return missed_m > near_m and (far_short or now.balance.tried(way_m, slide.direction) > 1)
 
 
-def _after_presliding(memory: SlideMemory, state: Presliding, outcome: SlideOutcome, now: "Now") -> SlideMemory:
+def _after_presliding(memory: SlideMemory, state: Presliding, outcome: SlideOutcome, now: Now) -> SlideMemory:
     """Return the memory after the packing was to give way: so far it holds, or, landed elsewhere, has broken loose."""
     loose = state.loose
     if not (outcome.moved and outcome.landing):
@@ -78,16 +75,16 @@ def _after_presliding(memory: SlideMemory, state: Presliding, outcome: SlideOutc
     return _taught(landed, loose, Went(way_m, way_m, moved=True, arrived=True), now)
 
 
-def sent_elsewhere(memory: SlideMemory, slide: Slide, now: "Now") -> SlideMemory:
+def sent_elsewhere(memory: SlideMemory, slide: Slide, now: Now) -> SlideMemory:
     """Return the memory of a slide that is sent elsewhere before it rests: no rest will say so, it may have slid."""
-    thresholds, position_m = now.bounds.thresholds, now.seen.position_m
+    thresholds, position_m = now.bounds.thresholds, now.position_m
     memory = replace(memory, anchor=Anchor(position_m, slide.direction))
     if not slid_away(slide, position_m, now.bounds):
         return memory
     memory, way_m, went_m = replace(memory, row=None), slide.way_m, slide.went_m(position_m)
     if not (1.0 - thresholds.missed) * way_m < went_m < thresholds.gone_on * way_m:
         return memory
-    jumped = _went_elsewhere(slide, went_m, max(2.0 * thresholds.missed * way_m, now.seen.quantum_m), now)
+    jumped = _went_elsewhere(slide, went_m, max(2.0 * thresholds.missed * way_m, now.quantum_m), now)
     return _taught(memory, slide, Went(way_m, went_m, moved=True, arrived=not jumped), now)
 
 
@@ -98,7 +95,7 @@ def slid_away(slide: Slide, position_m: float, bounds: SlideBounds) -> bool:
     return slide.went_m(position_m) > gives_m
 
 
-def held(memory: SlideMemory, slide: Slide, now: "Now") -> SlideMemory:
+def held(memory: SlideMemory, slide: Slide, now: Now) -> SlideMemory:
     """Return the memory after a slide that did not break the stem loose."""
     way_m = slide.way_m
     if memory.distances is None or memory.learnt is None or way_m <= 0.0:
@@ -113,7 +110,7 @@ def held(memory: SlideMemory, slide: Slide, now: "Now") -> SlideMemory:
     return _taught(memory, slide, Went(way_m, 0.0, moved=False, arrived=False), now)
 
 
-def _taught(memory: SlideMemory, slide: Slide, went: Went, now: "Now") -> SlideMemory:
+def _taught(memory: SlideMemory, slide: Slide, went: Went, now: Now) -> SlideMemory:
     """Return the memory with what a slide taught; where nobody knows whether it turned, only that it held."""
     if memory.distances is None or (slide.turning is None and went.moved):
         return memory

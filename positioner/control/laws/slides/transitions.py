@@ -14,14 +14,12 @@ is what was known before the row.
 """
 
 from collections.abc import Callable
-from dataclasses import dataclass, replace
-from functools import cached_property
+from dataclasses import replace
 from typing import NamedTuple
 
 from config.codes import InhibitReason
-from positioner.control.laws.slides.plan import Plan, beside_m, shortest_seen_m
-from positioner.control.laws.slides.slide_balance import Balance
-from positioner.control.laws.slides.slide_bounds import SlideBounds
+from positioner.control.laws.slides.now import Now
+from positioner.control.laws.slides.plan import Plan, shortest_seen_m
 from positioner.control.laws.slides.slide_memory import Excursions, Move, Row, SlideMemory, day_m
 from positioner.control.laws.slides.states import (
     STATES,
@@ -37,46 +35,13 @@ from positioner.control.laws.slides.states import (
     Watching,
     slide_of,
 )
-from positioner.control.laws.slides.stem_observation import StemObservation
 from positioner.control.laws.slides.teaching import sent_elsewhere, slid_away
-from positioner.estimation.landings.breakaway_distance import Local
 from positioner.estimation.landings.landing_detector import STOP
 from positioner.estimation.landings.stem_at_rest import Rest
 
 NOTHING = InhibitReason.NOTHING
 COMMANDING = tuple(each for each in STATES if each is not Watching)
 UNDER_WAY = tuple(each for each in COMMANDING if each is not Stuck)
-
-
-@dataclass
-class Now:
-    """What one step is decided from."""
-
-    seen: StemObservation
-    reference_m: float
-    balance: Balance
-    bounds: SlideBounds
-
-    @cached_property
-    def local(self) -> Local:
-        """What break-away distances at the reference are of those in the middle of the travel."""
-        return self.balance.local(self.reference_m)
-
-    def plan(self, memory: SlideMemory, from_m: float) -> Plan:
-        """Return a plan for a stem that stands somewhere, m."""
-        assert memory.distances is not None, "known since the first step"
-        return Plan(
-            bounds=self.bounds,
-            balance=self.balance,
-            distances=memory.distances,
-            local=self.local,
-            anchor=memory.anchor,
-            from_m=from_m,
-            target_m=self.reference_m,
-            quantum_m=self.seen.quantum_m,
-            preslides=memory.move.preslid < self.bounds.thresholds.most_preslid,
-            surely=memory.move.held or memory.move.landed >= self.bounds.thresholds.tried,
-        )
 
 
 # While the stem moves, or may yet move.
@@ -87,45 +52,46 @@ def gone_far_enough(memory: SlideMemory, now: Now) -> SlideMemory | None:
 
     What follows a slow pressure goes on, at a speed v, for about as long as it has taken until now: by v t.
     """
-    state, seen, thresholds = memory.state, now.seen, now.bounds.thresholds
+    state, position_m, thresholds = memory.state, now.position_m, now.bounds.thresholds
     if not isinstance(state, Out) or not _seen_for_a_while(state, now):
         return None
     slide, s = state.slide, state.slide.direction
-    if s * (slide.from_m - now.reference_m) > 0.0 and not slid_away(slide, seen.position_m, now.bounds):
+    if s * (slide.from_m - now.reference_m) > 0.0 and not slid_away(slide, position_m, now.bounds):
         return None  # it was beyond before
-    beyond_m = min(s * (each - now.reference_m) for each in (seen.position_m, state.seen_m))
-    went_m = abs(seen.position_m - state.seen_m)
-    goes_on = (seen.now_s - state.given_s) / (seen.now_s - state.seen_s)
-    if (went_m - seen.quantum_m) * goes_on >= thresholds.no_farther * now.bounds.stroke_m:
+    beyond_m = min(s * (each - now.reference_m) for each in (position_m, state.seen_m))
+    went_m = abs(position_m - state.seen_m)
+    goes_on = (now.now_s - state.given_s) / (now.now_s - state.seen_s)
+    if (went_m - now.quantum_m) * goes_on >= thresholds.no_farther * now.bounds.stroke_m:
         return None
-    if beyond_m <= now.plan(memory, seen.position_m).way_m(-s, turning=True):
+    if beyond_m <= Plan(now, memory, position_m).way_m(-s, turning=True):
         return None
-    return _slide(sent_elsewhere(memory, slide, now), now, seen.position_m, now.reference_m, -s)
+    memory = sent_elsewhere(memory, slide, now)
+    return _slide(memory, now, Plan(now, memory, position_m).slide(now.reference_m, -s))
 
 
 def reference_far_off(memory: SlideMemory, now: Now) -> SlideMemory | None:
     """Follow a reference that changes while the stem moves, where that can be done at once."""
-    seen, reference_m = now.seen, now.reference_m
+    position_m, reference_m = now.position_m, now.reference_m
     if memory.target_m is None or reference_m == memory.target_m:
         return None
-    s = 1 if reference_m > seen.position_m else -1
-    sure_m = now.plan(memory, seen.position_m).interval(s, turning=True).sure_m
-    if abs(reference_m - seen.position_m) < now.bounds.thresholds.far * sure_m:
+    s = 1 if reference_m > position_m else -1
+    sure_m = Plan(now, memory, position_m).interval(s, turning=True).sure_m
+    if abs(reference_m - position_m) < now.bounds.thresholds.far * sure_m:
         return None
     slide = slide_of(memory.state)
-    if slide is not None and slid_away(slide, seen.position_m, now.bounds):
+    if slide is not None and slid_away(slide, position_m, now.bounds):
         memory = sent_elsewhere(memory, slide, now)
     command_pa = now.bounds.allowed_pa(now.balance.pressure_pa(reference_m, s))
-    move = Move(now.bounds.thresholds.most_slides).given(seen.now_s, None)
+    move = Move(now.bounds.thresholds.most_slides).given(now.now_s, None)
     return replace(memory, command_pa=command_pa, target_m=reference_m, move=move, state=Sliding(None))
 
 
 def overdue(memory: SlideMemory, now: Now) -> SlideMemory | None:
     """Say why the stem is off its reference and is not moved; said once, that stays until it rests."""
-    why, target_m = now.seen.waits_for, memory.target_m
+    why, target_m = now.waits_for, memory.target_m
     if why is NOTHING or target_m is None:
         return None
-    if abs(target_m - now.seen.position_m) <= now.bounds.dead_band_m + now.seen.quantum_m:
+    if abs(target_m - now.position_m) <= now.bounds.dead_band_m + now.quantum_m:
         return None
     state = memory.state
     if isinstance(state, Waiting | Out) and state.reason is why:
@@ -136,19 +102,18 @@ def overdue(memory: SlideMemory, now: Now) -> SlideMemory | None:
 
 def on_its_way(memory: SlideMemory, now: Now) -> SlideMemory:
     """Go on; of an excursion, with what brings it back from where it is."""
-    state, seen = memory.state, now.seen
+    state, position_m = memory.state, now.position_m
     if not isinstance(state, Out):
         return memory if memory.target_m is not None else replace(memory, target_m=now.reference_m)
-    plan = now.plan(memory, seen.position_m)
-    back_pa = plan.back_pa(state.slide.direction, seen.position_m, seen.position_m - state.seen_m)
+    back_pa = Plan(now, memory, position_m).back_pa(state.slide.direction, position_m - state.seen_m)
     if _seen_for_a_while(state, now):
-        state = replace(state, seen_m=seen.position_m, seen_s=seen.now_s)
+        state = replace(state, seen_m=position_m, seen_s=now.now_s)
     return replace(memory, state=replace(state, back_pa=back_pa))
 
 
 def _seen_for_a_while(state: Out, now: Now) -> bool:
     """Whether where the stem was is known from long enough ago to tell how fast it goes; by rounding, not quite."""
-    return now.seen.now_s - state.seen_s > (1.0 - 1e-6) * now.bounds.thresholds.watched_s
+    return now.now_s - state.seen_s > (1.0 - 1e-6) * now.bounds.thresholds.watched_s
 
 
 # At rest.
@@ -160,7 +125,7 @@ def settled(memory: SlideMemory, now: Now, rest: Rest) -> SlideMemory:
     moved_m = bounds.thresholds.longest_giving * bounds.stroke_m
     if row is not None and row.stuck_at_m is not None and abs(rest.position_m - row.stuck_at_m) > moved_m:
         memory = replace(memory, row=None, move=Move(bounds.thresholds.most_slides))
-    move = memory.move.refilled(now.seen.now_s, bounds)
+    move = memory.move.refilled(now.now_s, bounds)
     anchor = memory.anchor_at(rest.position_m, bounds)
     if move is memory.move and anchor is memory.anchor and memory.target_m == now.reference_m:
         return memory
@@ -169,7 +134,7 @@ def settled(memory: SlideMemory, now: Now, rest: Rest) -> SlideMemory:
 
 def there(memory: SlideMemory, now: Now) -> SlideMemory | None:
     """End the move: the stem is within the dead band, or as near as it is known."""
-    return _idle(memory, NOTHING) if abs(_error_m(now)) <= _band_m(now) else None
+    return _idle(memory, NOTHING) if abs(now.error_m) <= _band_m(now) else None
 
 
 def as_near_as_slides_land(memory: SlideMemory, now: Now) -> SlideMemory | None:
@@ -177,7 +142,7 @@ def as_near_as_slides_land(memory: SlideMemory, now: Now) -> SlideMemory | None:
     thresholds, landed = now.bounds.thresholds, memory.move.landed
     beyond = max(0, landed - thresholds.free_landings)
     band_m = max(_band_m(now), now.balance.scatter_m if beyond else 0.0) * thresholds.widening ** (beyond // 2)
-    near = abs(_error_m(now)) <= band_m or _on_stop(memory, now)
+    near = abs(now.error_m) <= band_m or _on_stop(memory, now)
     return _idle(memory, InhibitReason.TRIM_ENDED) if near else None
 
 
@@ -196,30 +161,28 @@ def one_slide(memory: SlideMemory, now: Now) -> SlideMemory | None:
     if now.bounds.allowed_pa(wanted_pa) == memory.command_pa:  # under which it rests: it holds the stem
         beyond = not now.bounds.allows(wanted_pa)
         return _stuck_or_barred(memory, now, InhibitReason.LAW_BEYOND_LIMITS) if beyond else None
-    return _slide(memory, now, slide.from_m, slide.to_m, slide.direction)
+    return _slide(memory, now, slide)
 
 
 def _one_slide(memory: SlideMemory, now: Now) -> tuple[Slide, bool]:
     """Return the one slide to the reference, and whether it is long enough to break loose."""
-    from_m, s = _standing_m(memory, now), _side(now)
-    plan = now.plan(memory, from_m)
+    plan, s = Plan.at_rest(memory, now), now.side
     way_m = plan.way_m(s)
     if isinstance(memory.state, Out) and s == -memory.state.slide.direction:
         # Planned by what may do: it is tried before more is asked for.
         likely_m = plan.interval(s, turning=plan.turns(s)).likely_m
         way_m = min(way_m, max(likely_m, shortest_seen_m(now.bounds)))
-    to_m = now.reference_m + (0.0 if memory.course is None else plan.lead_m(memory.course, now.seen.now_s, s))
-    return _slide_from(memory, from_m, to_m, s), s * (to_m - from_m) >= way_m
+    slide = plan.slide(now.reference_m + plan.lead_m(s), s)
+    return slide, slide.way_m >= way_m
 
 
 def preslid(memory: SlideMemory, now: Now) -> SlideMemory | None:
     """Move the stem directly, where its packing gives way so far without breaking loose."""
-    move, s, from_m = memory.move, _side(now), _standing_m(memory, now)
-    command_pa = now.plan(memory, from_m).preslid_pa(_rest(now).position_m, memory.command_pa)
+    move, s, plan = memory.move, now.side, Plan.at_rest(memory, now)
+    command_pa = plan.preslid_pa()
     if command_pa is None or command_pa == memory.command_pa:
         return None
-    sent_m = (command_pa - now.balance.pressure_pa(now.reference_m, s)) / -now.balance.ratios.b_over_c
-    loose = _slide_from(memory, from_m, now.reference_m + sent_m, s)
+    loose = plan.slide(now.reference_m + plan.ahead_m(command_pa, s), s)
     return replace(
         memory,
         command_pa=command_pa,
@@ -230,84 +193,63 @@ def preslid(memory: SlideMemory, now: Now) -> SlideMemory | None:
 
 def taken_back(memory: SlideMemory, now: Now) -> SlideMemory | None:
     """Leave the error to the references to come."""
-    course, s = memory.course, _side(now)
+    course = memory.course
     if course is None:
         return None
-    way_m = now.plan(memory, _standing_m(memory, now)).way_m(s)
+    way_m = Plan.at_rest(memory, now).way_m(now.side)
     away_s = memory.excursions.away_s if memory.excursions is not None else 0.0
-    takes_back = course.takes_back(now.seen.now_s, _error_m(now), way_m, away_s)
+    takes_back = course.takes_back(now.now_s, now.error_m, way_m, away_s)
     return _idle(memory, InhibitReason.REFERENCE_COMES) if takes_back else None
 
 
 def excursion_waits(memory: SlideMemory, now: Now) -> SlideMemory | None:
     """Wait: the last excursion was too recent. Not where it has left the stem away, for the second was too short."""
     before = memory.excursions
-    if before is None or now.seen.now_s - before.begun_s >= now.bounds.excursion_interval_s or _left_away(memory, now):
+    if before is None or now.now_s - before.begun_s >= now.bounds.excursion_interval_s or _left_away(memory, now):
         return None
     return _idle(memory, InhibitReason.EXCURSION_WAITS)
 
 
 def two_slides(memory: SlideMemory, now: Now) -> SlideMemory:
     """Give the first of two slides, by whichever side it may, and what is left of the day's travel allows; or end."""
-    seen, bounds = now.seen, now.bounds
+    now_s, bounds = now.now_s, now.bounds
     if memory.move.left < 2:  # it is to come back
         return _stuck_or_barred(memory, now, InhibitReason.TRIM_ENDED)
-    from_m = _standing_m(memory, now)
-    plan, spent = now.plan(memory, from_m), memory.excursions
-    begun, reasons = memory.move.landed > 0 or bool(memory.course and memory.course.changes_m), []
-    for each in plan.excursions(begun=begun):
-        spent_m = (spent.spent_at_m(seen.now_s, bounds) if spent else 0.0) + 2 * each.beyond_m
+    plan, spent, reasons = Plan.at_rest(memory, now), memory.excursions, []
+    for each in plan.excursions():
+        spent_m = (spent.spent_at_m(now_s, bounds) if spent else 0.0) + 2 * each.beyond_m
         broke = 0.0 < day_m(bounds) < spent_m and not _left_away(memory, now)
         reasons.append(plan.barred(each) or (InhibitReason.EXCURSION_BUDGET_SPENT if broke else NOTHING))
         if reasons[-1] is not NOTHING:
             continue
-        slide = _slide_from(memory, from_m, each.by_m, each.direction)
-        command_pa = bounds.allowed_pa(now.balance.slide_pa(from_m, each.by_m, each.direction))
+        command_pa = bounds.allowed_pa(now.balance.slide_pa(plan.from_m, each.by_m, each.direction))
         if command_pa == memory.command_pa:
             return _stuck_or_barred(memory, now, InhibitReason.TRIM_ENDED)
         out = Out(
-            slide=slide,
-            given_s=seen.now_s,
-            seen_m=seen.position_m,
-            seen_s=seen.now_s,
-            back_pa=plan.back_pa(each.direction, from_m, 0.0),
+            slide=plan.slide(each.by_m, each.direction),
+            given_s=now_s,
+            seen_m=now.position_m,
+            seen_s=now_s,
+            back_pa=plan.back_pa(each.direction, 0.0),
         )
         return replace(
             memory,
             command_pa=command_pa,
             state=out,
-            move=memory.move.given(seen.now_s, None),
-            excursions=Excursions(seen.now_s, spent.away_s if spent else 0.0, spent_m),
+            move=memory.move.given(now_s, None),
+            excursions=Excursions(now_s, spent.away_s if spent else 0.0, spent_m),
         )
     if InhibitReason.EXCURSION_BUDGET_SPENT in reasons:
         return _idle(memory, InhibitReason.EXCURSION_BUDGET_SPENT)
     return _stuck_or_barred(memory, now, max(reasons, key=lambda each: each is InhibitReason.LAW_BEYOND_LIMITS))
 
 
-def _rest(now: Now) -> Rest:
-    assert now.seen.rest is not None, "only asked of a stem at rest"
-    return now.seen.rest
-
-
-def _error_m(now: Now) -> float:
-    return now.reference_m - _rest(now).position_m
-
-
-def _side(now: Now) -> int:
-    return 1 if _error_m(now) > 0 else -1
-
-
-def _standing_m(memory: SlideMemory, now: Now) -> float:
-    """Return where a slide begins, m: where the last one ended, whatever the packing has given way since."""
-    return _rest(now).position_m if memory.anchor is None else memory.anchor.position_m
-
-
 def _band_m(now: Now) -> float:
     """Return within what an error is none, m."""
     thresholds = now.bounds.thresholds
-    known_m = max(
-        thresholds.noise_deviations * _rest(now).std_m, thresholds.noise_quanta * now.seen.quantum_m
-    ) + beside_m(now.bounds, now.balance)
+    known_m = (
+        max(thresholds.noise_deviations * now.at_rest.std_m, thresholds.noise_quanta * now.quantum_m) + now.beside_m
+    )
     return max(now.bounds.dead_band_m, known_m)
 
 
@@ -316,7 +258,7 @@ def _on_stop(memory: SlideMemory, now: Now) -> bool:
 
     Another one would, too: the stop bears the rest, so that it says nothing of the balance.
     """
-    slide, rest_m, target_m = memory.move.last, _rest(now).position_m, now.reference_m
+    slide, rest_m, target_m = memory.move.last, now.at_rest.position_m, now.reference_m
     if slide is None:
         return False
     s, within_m = slide.direction, STOP * now.balance.stroke_m
@@ -331,25 +273,16 @@ def _on_stop(memory: SlideMemory, now: Now) -> bool:
 
 def _left_away(memory: SlideMemory, now: Now) -> bool:
     """Whether a slide of the move has left the stem away."""
-    from_m = _standing_m(memory, now)
-    back_m = now.plan(memory, from_m).back_m(_side(now))
-    return memory.move.given_s is not None and abs(now.reference_m - from_m) > 0.5 * back_m
+    plan = Plan.at_rest(memory, now)
+    return memory.move.given_s is not None and abs(now.reference_m - plan.from_m) > 0.5 * plan.back_m(now.side)
 
 
-def _slide_from(memory: SlideMemory, from_m: float, to_m: float, direction: int) -> Slide:
-    turning = None if memory.anchor is None else memory.anchor.turns(direction)
-    return Slide(from_m=from_m, to_m=to_m, direction=direction, turning=turning)
-
-
-def _slide(memory: SlideMemory, now: Now, from_m: float, to_m: float, direction: int) -> SlideMemory:
+def _slide(memory: SlideMemory, now: Now, sent: Slide) -> SlideMemory:
     """Give a slide: the second of two, if the first is under way."""
-    now_s, bounds, state = now.seen.now_s, now.bounds, memory.state
-    wanted_pa = now.balance.slide_pa(from_m, to_m, direction)
-    command_pa = bounds.allowed_pa(wanted_pa)
-    slide: Slide | None
-    slide, reason = _slide_from(memory, from_m, to_m, direction), NOTHING
-    if command_pa != wanted_pa:
-        slide, reason = None, InhibitReason.LAW_BEYOND_LIMITS
+    now_s, state = now.now_s, memory.state
+    wanted_pa = now.balance.slide_pa(sent.from_m, sent.to_m, sent.direction)
+    command_pa = now.bounds.allowed_pa(wanted_pa)
+    slide, reason = (sent, NOTHING) if command_pa == wanted_pa else (None, InhibitReason.LAW_BEYOND_LIMITS)
     excursions = memory.excursions
     if isinstance(state, Out) and excursions is not None:
         excursions = replace(excursions, away_s=now_s - state.given_s)
@@ -378,10 +311,10 @@ def _stuck_or_barred(memory: SlideMemory, now: Now, reason: InhibitReason) -> Sl
     with what was known before, and what is held until then brings a stem that comes free to its reference, not to where
     the last push would have.
     """
-    row, rest_m, error_m, s = memory.row, _rest(now).position_m, _error_m(now), _side(now)
+    row, rest_m, error_m, s = memory.row, now.at_rest.position_m, now.error_m, now.side
     if row is None:
         return _idle(memory, reason)
-    before = row.before.at(s, turning=memory.anchor is None or memory.anchor.turns(s), local=now.balance.local(rest_m))
+    before = row.before.at(s, turning=Plan(now, memory, rest_m).turns(s), local=now.balance.local(rest_m))
     whole_way = before.seen and abs(error_m) >= before.broke_m
     if not (row.stuck or row.held >= now.bounds.thresholds.stuck_after or whole_way):
         return _idle(memory, reason)
@@ -426,7 +359,7 @@ TABLE = (*MOVING, *AT_REST)
 
 def after(memory: SlideMemory, now: Now) -> SlideMemory:
     """Return the memory after the first rule that holds."""
-    rest = now.seen.rest
+    rest = now.rest
     memory = memory if rest is None else settled(memory, now, rest)
     for rule in MOVING if rest is None else AT_REST:
         if isinstance(memory.state, rule.of) and (followed := rule.follow(memory, now)) is not None:
