@@ -458,11 +458,12 @@ def _law(now: Now, before: Law, seen: Seen, *, one_direction: bool) -> tuple[int
     memory, ratios = now.memory, seen.ratios
     if ratios is None or not one_direction:
         return 0, before.observe(seen)
-    unseen, at_m = ratios.directions.unseen, now.sample.position_m
-    asked_anew = seen.reference_m != memory.reference.value_m
-    if not first_landing.goes_on(memory.first_landing, ratios, seen.reference_m - at_m, asked_anew=asked_anew):
-        law, stroke_m = before.observe(seen), now.settings.limits.stroke_m
-        if not first_landing.needed(unseen, ratios, law.command_pa, memory.wanted_pa, at_m, stroke_m):
+    unseen = ratios.directions.unseen
+    asked_back = unseen * (seen.reference_m - now.sample.position_m) <= 0.0
+    asked_back = asked_back and seen.reference_m != memory.reference.value_m
+    if memory.first_landing != unseen or asked_back:
+        law = before.observe(seen)
+        if not first_landing.needed(seen, ratios, law.command_pa, now.settings.limits.stroke_m):
             return 0, law
     return unseen, before.observe(seen._replace(ratios=None))
 

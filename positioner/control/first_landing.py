@@ -12,9 +12,11 @@ the pressure goes that way in steps in its place, each once the stem rests under
 p pressure in force, d direction, B balance (`Ratios.balance_pa`), κ = k_s/A, h = 1 % of stroke, λ = 0.4, r - x the way
 that is left. The stem breaks loose under a pressure that is at most one step beyond what it needs, so
 that it slides by its own jump and 0.4 of its way at the most.
-Where it lands φ_d = d (p - κ x) is known, and the law commands on from there.
+Where it lands φ_d = d (p - κ x) is known, and the law commands on from there; or from where a new reference asks the
+stem back the way that is known.
 """
 
+from positioner.control.laws.boundary import Seen
 from positioner.estimation.acceptance import Ratios
 
 LEAST_STEP = 0.01
@@ -23,37 +25,18 @@ SHARE = 0.4
 """λ."""
 
 
-def needed(direction: int, ratios: Ratios, asked_pa: float, pressure_pa: float, at_m: float, stroke_m: float) -> bool:
-    """Return whether a stem might slide in a direction that was not seen by what a law asks for.
+def needed(seen: Seen, ratios: Ratios, asked_pa: float, stroke_m: float) -> bool:
+    """Return whether a stem might slide in the direction that was not seen by what a law asks for, Pa.
 
     Args:
-        direction: that was not seen.
+        seen: of the stem, and the pressure in force.
         ratios: in use.
         asked_pa: by the law.
-        pressure_pa: in force.
-        at_m: where the stem is.
         stroke_m: full travel.
     """
-    visible_pa = -ratios.b_over_c * LEAST_STEP * stroke_m / 2
-    goes_pa, over_pa = (
-        direction * (asked_pa - pressure_pa),
-        direction * (asked_pa - ratios.balance_pa(at_m, -direction)),
-    )
-    return goes_pa > visible_pa and over_pa > 0.0
-
-
-def goes_on(under_way: int, ratios: Ratios | None, way_m: float, *, asked_anew: bool) -> bool:
-    """Return whether steps in a direction go on: until the stem has landed, or is asked back the way that is known.
-
-    Args:
-        under_way: their direction, 0 none.
-        ratios: in use; None: no law commands.
-        way_m: from the stem to its reference.
-        asked_anew: whether the reference has changed.
-    """
-    if under_way == 0 or ratios is None or under_way != ratios.directions.unseen:
-        return False
-    return not (asked_anew and under_way * way_m <= 0.0)
+    d, visible_pa = ratios.directions.unseen, -ratios.b_over_c * LEAST_STEP * stroke_m / 2
+    over_pa = d * (asked_pa - ratios.balance_pa(seen.sample.position_m, -d))
+    return d * (asked_pa - seen.command_pa) > visible_pa and over_pa > 0.0
 
 
 def stepped_pa(pressure_pa: float, direction: int, ratios: Ratios, way_m: float, stroke_m: float) -> float:

@@ -325,7 +325,7 @@ def test_a_stem_that_comes_free_goes_to_its_reference_and_is_as_movable_as_befor
     now = memory_of(loop).distances
     assert before is not None
     assert now is not None
-    for one, other in zip(now.all, before.all, strict=True):
+    for one, other in zip(now, before, strict=True):
         assert (one.held_m, one.broke_m) == pytest.approx((other.held_m, other.broke_m), rel=1e-3)
     free(loop)
     path = loop.step_to(0.6, cycles=200)

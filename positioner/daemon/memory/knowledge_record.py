@@ -77,7 +77,7 @@ def record_of(knowledge: ValveKnowledge) -> dict[str, Any]:
         "landings": [each._asdict() for each in knowledge.landings[:MOST_LANDINGS] if _finite(each)],
         "held": [each._asdict() for each in knowledge.held[:MOST_LANDINGS] if _finite(each)],
         "answers": list(knowledge.answers),
-        "distances": None if knowledge.distances is None else [_kept(each) for each in knowledge.distances.all],
+        "distances": None if knowledge.distances is None else [_kept(each) for each in knowledge.distances],
         "tracked": dict(knowledge.tracked),
     }
 

@@ -147,8 +147,7 @@ UNKNOWN = Interval()
 MIDDLE = Local()
 
 
-@dataclass(frozen=True, slots=True)
-class BreakawayDistance:
+class BreakawayDistance(NamedTuple):
     """The four intervals, as in the middle of the travel."""
 
     onward_up: Interval = UNKNOWN
@@ -156,29 +155,18 @@ class BreakawayDistance:
     turning_up: Interval = UNKNOWN
     turning_down: Interval = UNKNOWN
 
-    @property
-    def all(self) -> tuple[Interval, Interval, Interval, Interval]:
-        """In the order of the fields."""
-        return self.onward_up, self.onward_down, self.turning_up, self.turning_down
-
     def at(self, direction: int, *, turning: bool, local: Local = MIDDLE) -> Interval:
         """Return the interval of slides in a direction at a place; what it lacks is its next of kin's."""
-        own = self._own(direction, turning=turning)
+        own = self[_index(direction, turning=turning)]
         for s, t in ((direction, not turning), (-direction, turning), (-direction, not turning)):
-            own = own.filled(self._own(s, turning=t))
+            own = own.filled(self[_index(s, turning=t)])
         return own.times(self._factor(direction, local, turning=turning))
 
     def taught(self, direction: int, went: Went, *, turning: bool, local: Local) -> "BreakawayDistance":
         """Return the distances after a slide in a direction."""
-        factor = self._factor(direction, local, turning=turning)
-        there = self._own(direction, turning=turning).times(factor).taught(went, turning=turning)
-        name = f"{'turning' if turning else 'onward'}_{'up' if direction > 0 else 'down'}"
-        return replace(self, **{name: there.times(1.0 / factor)})
-
-    def _own(self, direction: int, *, turning: bool) -> Interval:
-        if turning:
-            return self.turning_up if direction > 0 else self.turning_down
-        return self.onward_up if direction > 0 else self.onward_down
+        factor, own = self._factor(direction, local, turning=turning), _index(direction, turning=turning)
+        there = self[own].times(factor).taught(went, turning=turning)
+        return self._replace(**{self._fields[own]: there.times(1.0 / factor)})
 
     def _factor(self, direction: int, local: Local, *, turning: bool) -> float:
         """Return by what factor a distance at a place differs from that in the middle.
@@ -188,9 +176,15 @@ class BreakawayDistance:
         by = local.on(direction)
         if not turning or by == local.friction == 1.0:
             return by
-        turns_m, on = self._own(direction, turning=True).broke_m, self._own(direction, turning=False)
+        on, turns = (self[_index(direction, turning=each)] for each in (False, True))
+        turns_m = turns.broke_m
         if turns_m == inf:
             return by
         on_m = max(on.held_m, min(turns_m, on.broke_m))
         rest_m = turns_m - on_m
         return max(SHRINKS, (on_m * by + rest_m * (local.friction if rest_m > 0.0 else 1.0)) / turns_m)
+
+
+def _index(direction: int, *, turning: bool) -> int:
+    """Return which of the four intervals is that of slides in a direction."""
+    return 2 * turning + (direction < 0)

@@ -118,8 +118,8 @@ def known_valve(knowledge: ValveKnowledge, bounds: SlideBounds) -> KnownValve | 
     distances = knowledge.distances
     if distances is None:
         return Refused("no slide has been made under the law", "break-away distances")
-    onward, turning = distances.all[:2], distances.all[2:]
-    if not all(each.seen and each.held_m > 0.0 for each in distances.all):
+    onward, turning = distances[:2], distances[2:]
+    if not all(each.seen and each.held_m > 0.0 for each in distances):
         return Refused("a direction in which no slide has held, or none has broken loose", "break-away distances")
     rounded_m = 0.5 * bounds.command_step_pa / slope_pa_per_m
     scatter_m = DEVIATIONS * max(*apart_m, median(each.std_m for each in knowledge.landings)) + rounded_m
