@@ -41,14 +41,14 @@ HOLD, MANUAL, AUTOMATIC = Mode
 class ServiceState(Code):
     """What the service does for a valve, beside the law's own states."""
 
-    STARTING = 0, "starting: no good measurement yet, what the device has is held"
+    STARTING = 0, "starting: no good measurement yet; the device's pressure is held"
     SHADOW = 1, "shadow: reads and never writes"
     STANDBY = 2, "standby: the pressure is held, nobody commands"
     ACTIVE = 3, "active: an operator or the law commands"
     FAULT_HOLD = 4, "fault, and the pressure is held"
     FAULT_SAFE = 5, "fault, and the pressure is the safe one"
     STOPPED = 6, "stopped: the valve is left as configured, nobody is served"
-    FAULT_MANUAL = 7, "fault, and an operator commands by hand"
+    FAULT_MANUAL = 7, "fault, and an operator commands in manual"
 
 
 class State(Code):
@@ -125,7 +125,7 @@ class InhibitReason(Code):
     EXCITATION_NO_CONSENT = 20, "excitation: no consent of the DCS"
     EXCITATION_VETOED = 21, "excitation: vetoed"
     EXCITATION_UNMEASURED = 22, "excitation waits for a good measurement"
-    STAIRCASE_UNANSWERED = 23, "the staircase of slides: the stem does not answer: it is stuck, or its sensor is frozen"
+    STAIRCASE_UNANSWERED = 23, "the staircase of slides: the stem does not answer; it is stuck, or its sensor is frozen"
     NOT_AT_REST = 24, "a slide waits: the stem creeps, or something else moves it"
     EXCITATION_FROM_BEFORE = (
         25,
@@ -133,10 +133,10 @@ class InhibitReason(Code):
     )
     STAIRCASE_REVERSED = (
         26,
-        "the staircase of slides: the position falls as the pressure rises: look at wiring, scales and [valve] action",
+        "the staircase of slides: the position falls as the pressure rises; check wiring, scales and [valve] action",
     )
     CUT_OFF = 27, "the reference is beyond a cut-off: the stem is pressed onto its stop"
-    PRESSURE_ELSEWHERE = 28, "a slide waits: the measured pressure is not the command: the supply may be low"
+    PRESSURE_ELSEWHERE = 28, "a slide waits: the measured pressure differs from the command; the supply may be low"
     ONE_DIRECTION = (
         29,
         "one direction is identified: the first move the other way goes by steps until the stem has landed",
@@ -193,7 +193,7 @@ class ValveTestVerdict(Code):
     TRAVEL_NOT_REACHED = 3, "the least travel was not reached"
     TRAVEL_EXCEEDED = 4, "the stem went too far"
     NOT_SEATED = 5, "the stem is not back where it was"
-    DEVIATION = 6, "the stem does not rest before the test: it is moved by something else"
+    DEVIATION = 6, "the stem does not rest before the test: something else moves it"
     PRESSURE_THRESHOLD = 7, "the pressure threshold was reached before the travel"
     NOT_MOVED = 8, "the stem did not move"
     NO_SUPPLY = 9, "the pressure does not follow the command: no supply, or no I/P"
@@ -236,7 +236,7 @@ class Refusal(Code):
     )
     MODEL_DOES_NOT_FIT = (
         20,
-        "the motion is not that of the model: look for a sensor that jumped, at device.sampling, and at "
+        "the motion does not fit the model: check the sensor for a jump, device.sampling, and "
         "identification.pressure_held",
     )
     LANDINGS_TOO_FEW = 21, "too few slides have ended in rest, or all in one direction"
@@ -247,11 +247,11 @@ class Refusal(Code):
     )
     LANDINGS_SHIFTED = (
         27,
-        "landings disagree before and after a moment: the sensor jumped, or the stem was shifted; try again",
+        "the landings shifted at one moment: the sensor jumped, or the stem was moved; try again",
     )
     PRELOAD_EXPLAINS_AS_WELL = 28, "a preload would explain the motion as well, with another b/c"
     DRIFT_EXPLAINS_AS_WELL = 32, "a sensor that drifts would explain the motion as well, with another b/c or k/c"
-    TOO_SLOW = 30, "the stem moves too slowly to show its inertia: use steps"
+    TOO_SLOW = 30, "the stem moves too slowly to show its inertia: excite it by steps"
     NO_BREAKAWAY = 31, "the stem has not been seen to break away from a rest"
     BROKEN_OFF = 29, "S3 was broken off: by a fault, another mode, or a stem that did not answer"
 
@@ -312,7 +312,7 @@ class EndTrend(Code):
 
     NOT_KNOWN = 0, "not known: shut on too few days"
     STEADY = 1, "steady"
-    RISING = 2, "rising: the plug seats ever higher; something grows on the seat or lies there"
+    RISING = 2, "rising: the plug seats ever higher; there is something on the seat"
     FALLING = 3, "falling: the plug seats ever lower, the seat wears"
     JUMPED = 4, "jumped: the zero has shifted"
     SCATTERED = 5, "scattered: the plug seats elsewhere each time"
@@ -344,19 +344,19 @@ class EventKind(Code):
     EXCITATION_ENDED = 10, "the excitation has ended"
     IDENTIFIED = 11, "an identification was applied"
     NOT_IDENTIFIED = 12, "an identification was refused"
-    RESTORED = 13, "what is known from before a restart is judged anew"
+    RESTORED = 13, "what was known before a restart is judged anew"
     EXPERIMENT = 14, "a played experiment"
     CONFIGURATION = 15, "the configuration has changed since the last start"
     HISTORY_GAP = 16, "the history has a gap"
-    HISTORY_ANEW = 17, "the history was unreadable, set aside and begun anew"
+    HISTORY_ANEW = 17, "the history was unreadable: it is set aside, and a new one begins"
     CLOCK_SET = 18, "the gateway's clock was set"
-    LOCKED_OUT = 19, "the local switch locks out whoever writes from afar"
-    LET_IN = 20, "the local switch lets writes in again"
+    LOCKED_OUT = 19, "the local switch locks out remote writes"
+    LET_IN = 20, "the local switch permits remote writes again"
     ALARM_RAISED = 21, "an alarm is raised"
     ALARM_RETURNED = 22, "an alarm has returned to normal"
     ALARM_ACKNOWLEDGED = 23, "an alarm is acknowledged"
     ALARM_SHELVED = 24, "an alarm is shelved"
-    ALARM_UNSHELVED = 25, "an alarm is shelved no more"
+    ALARM_UNSHELVED = 25, "an alarm is unshelved"
 
 
 CAUSES: dict[EventKind, type[Code]] = {

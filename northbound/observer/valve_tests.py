@@ -30,7 +30,7 @@ TESTS: Mapping[str, tuple[str, ...]] = {
     "signature": ("signature",),
 }
 """The commands, by what people call the tests."""
-KEPT_AS: Mapping[str, str] = {"": "no more than its trend", "as_found": "as found", "as_left": "as left"}
+KEPT_AS: Mapping[str, str] = {"": "not kept, only its trend", "as_found": "as found", "as_left": "as left"}
 COMMAND = (sys.executable, "-m", "positioner.cli")
 TEST_END_WITHIN_S = 10.0
 

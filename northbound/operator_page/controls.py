@@ -90,14 +90,14 @@ def rights(role: Role) -> str:
     """Say what a role may not write, and who may.
 
     >>> rights(Role.ENGINEER), rights(Role.OPERATOR)
-    ('engineer: all may be written', 'operator: for mode, pressure, identification sign in as engineer')
+    ('engineer: you may write all', 'operator: to write mode, pressure, identification, sign in as engineer')
     """
     needed: dict[Role, list[str]] = {}
     for register, what in WRITTEN.items():
         if refusal_for(role, register) is not None:
             needed.setdefault(register_named(register).writer, []).append(what)
-    denied = [f"for {', '.join(what)} sign in as {other.name.lower()}" for other, what in needed.items()]
-    return f"{role.name.lower()}: {'; '.join(denied) or 'all may be written'}"
+    denied = [f"to write {', '.join(what)}, sign in as {other.name.lower()}" for other, what in needed.items()]
+    return f"{role.name.lower()}: {'; '.join(denied) or 'you may write all'}"
 
 
 class Controls:

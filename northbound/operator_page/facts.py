@@ -101,7 +101,7 @@ def cycle(picture: ValvePicture) -> list[Fact]:
         *(Fact(label, milli.text(picture.value(name)), BY_NAME[name].text) for label, name in times),
         Fact("age of the sample", Unit("s", 1.0, 3).text(age_s), BY_NAME["sample_age"].text),
         *(Fact(label, _count(picture.value(name)), BY_NAME[name].text) for label, name in counts),
-        Fact("restarts of the daemon", f"{picture.restarts} since this page is open"),
+        Fact("restarts of the daemon", f"{picture.restarts} since this page was opened"),
     ]
 
 

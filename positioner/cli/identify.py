@@ -20,7 +20,7 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
     parser.add_argument(
         "--alpha-pa",
         type=float,
-        help="mean pressure of a sine, [excitation] kind; 0: the pressure that holds the stem",
+        help="mean pressure, if [excitation] kind is a sine; 0: the pressure that holds the stem",
     )
     parser.add_argument("--beta-pa", type=float, help="amplitude of a sine")
     parser.add_argument("--omega-rad-per-s", type=float, help="angular frequency of a sine")

@@ -181,7 +181,8 @@ def command_parser(words: Sequence[str] = ()) -> argparse.ArgumentParser:
     parser = OneLine(
         prog="positioner",
         description="Identifies and positions sticking pneumatic control valves over fieldbus.",
-        epilog="exit status: 0 done or yes, 1 no (each command says what), 2 bad input",
+        epilog="Exit status: 0 done or yes, 1 no (each command says what), 2 bad input. "
+        "In the help of a command, brackets after an option hold its default.",
     )
     parser.add_argument("--version", action="version", version=f"positioner {version('positioner')}")
     commands = parser.add_subparsers(dest="command", metavar="COMMAND", required=True)

@@ -32,7 +32,12 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
     _add_share(parser, "--start", 0.005, "travel that counts as break-out")
     parser.add_argument("--towards", choices=("open", "closed"), help="direction (away from the nearer end)")
     parser.add_argument("--step", action="store_true", help="step at the rate limit in place of a ramp")
-    parser.add_argument("--threshold-pa", type=float, metavar="PA", help="the command stays within this pressure")
+    parser.add_argument(
+        "--threshold-pa",
+        type=float,
+        metavar="PA",
+        help="pressure beyond which the command is not taken (the limit of [experiment])",
+    )
     parser.add_argument(
         "--failure-rate-per-h",
         type=float,

@@ -18,7 +18,7 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
         "--listen-port",
         type=_port,
         metavar="N",
-        help="port, or loopback CAN channel, in place of that of the file; 0 takes a free one",
+        help="port or loopback CAN channel (that of the file); 0 takes a free one",
     )
 
 

@@ -20,7 +20,7 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
         type=float,
         nargs=2,
         metavar=("FIRST", "LAST"),
-        help="bench range: gauge pressures at which the stem leaves one end and reaches the other, whatever the action",
+        help="bench range: gauge pressures at which the stem leaves one end and reaches the other, for either action",
     )
     parser.add_argument("--stroke-mm", type=float, metavar="MM", help="rated travel")
     parser.add_argument(

@@ -10,11 +10,11 @@ from typing import Annotated, NamedTuple
 from sim.effect import Parameter
 
 COMPLAINT = "spring or diaphragm"
-LOOKS = "The static curve bends, the more the higher the pressure; in fast moves the pull of a pascal varies with x."
+LOOKS = "The static curve bends, more at higher pressure; in fast moves the force of one pascal varies with x."
 CONFOUNDED = {
-    "flow_force": "fast moves, in which the pressure parts from the static curve",
-    "spring_hardening": "fast moves, in which the pressure parts from the static curve",
-    "sensor_nonlinearity": "fast moves, in which the pressure parts from the static curve",
+    "flow_force": "fast moves, in which the pressure leaves the static curve",
+    "spring_hardening": "fast moves, in which the pressure leaves the static curve",
+    "sensor_nonlinearity": "fast moves, in which the pressure leaves the static curve",
 }
 INVERSE = "balance"
 
@@ -25,7 +25,7 @@ class Parameters(NamedTuple):
     change_m2: Annotated[
         float,
         Parameter(
-            "area at full travel less that at none",
+            "area at full travel less area at no travel",
             -1.0,
             1.0,
             off=0.0,

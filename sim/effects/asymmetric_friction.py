@@ -11,7 +11,7 @@ from sim.effect import Parameter
 
 COMPLAINT = "sticks"
 LOOKS = (
-    "Opening and closing break away at, and slide against, different forces. Under a symmetric command in open loop "
+    "Break-away and sliding forces differ between opening and closing. Under a symmetric command in open loop "
     "the stem drifts one way."
 )
 CONFOUNDED = {

@@ -1,4 +1,4 @@
-"""Viscous friction that is higher in one direction: a check valve in a damper, a brush that trails or leads.
+"""Viscous friction that is higher in one direction: a check valve in a damper, say.
 
     F = -|c| v   where c v > 0,   0 else
 
@@ -12,7 +12,7 @@ from sim.effect import Parameter
 
 AFTER = "asymmetric_friction"
 COMPLAINT = "sticks"
-LOOKS = "Fast moves are slower one way than the other, the more the faster; slow ramps are the same both ways."
+LOOKS = "Fast moves are slower one way than the other, faster moves more so; slow ramps are the same both ways."
 CONFOUNDED = {
     "asymmetric_friction": "moves at several speeds both ways: this grows with the speed, asymmetric friction does not",
     "preload": "moves at several speeds both ways: this grows with the speed, a constant force does not",
@@ -28,7 +28,7 @@ class Parameters(NamedTuple):
     extra_ns_per_m: Annotated[
         float,
         Parameter(
-            "what one direction has more, > 0: opening",
+            "excess in one direction, > 0: opening",
             -1e6,
             1e6,
             off=0.0,

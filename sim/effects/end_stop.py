@@ -13,8 +13,8 @@ from sim.effect import Parameter
 COMPLAINT = "play or stop"
 LOOKS = "The stem halts at a position, always the same one, however far the command goes on, and leaves it late."
 CONFOUNDED = {
-    "supply_limit": "measured actuator pressure: the limit cuts it, a stop does not. Without it: a load that moves the "
-    "place where the stem halts moves only the limit's",
+    "supply_limit": "measured actuator pressure: the limit cuts it, a stop does not. Without it, another load: it "
+    "shifts the place where a limit halts the stem, and not that of a stop",
 }
 
 

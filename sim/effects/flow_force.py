@@ -15,7 +15,7 @@ LOOKS = "The static curve bends one way over the whole travel, the same in fast 
 CONFOUNDED = {
     "spring_n_per_m": "the bending of the static curve alone: travel over the whole stroke",
     "spring_hardening": "travel to both ends: the flow force bends the curve evenly, the spring late",
-    "area_variation": "fast moves, in which the pressure parts from the static curve",
+    "area_variation": "fast moves, in which the pressure leaves the static curve",
     "sensor_nonlinearity": "the width of the dead band over the travel, which a bent sensor stretches and squeezes",
 }
 INVERSE = "balance"

@@ -27,7 +27,7 @@ class Parameters(NamedTuple):
     growth: Annotated[
         float,
         Parameter(
-            "friction at full travel over that at none, less 1",
+            "friction at full travel over friction at no travel, less 1",
             -0.9,
             20.0,
             off=0.0,

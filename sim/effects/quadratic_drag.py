@@ -10,7 +10,7 @@ from typing import Annotated, NamedTuple
 from sim.effect import Parameter
 
 COMPLAINT = "flow"
-LOOKS = "High steps are slower than low ones would have it; slow ramps are untouched."
+LOOKS = "High steps are slower than low steps suggest; slow ramps are untouched."
 CONFOUNDED = {
     "viscous_ns_per_m": "moves at several speeds, from steps of different heights",
     "rate_limit": "measured actuator pressure: the limit lies before it, drag after",

@@ -1,4 +1,4 @@
-"""Limited flow of air: the actuator fills and vents no faster than it can.
+"""A limited flow of air: the actuator fills and vents at a limited rate.
 
     p = u where that keeps   -r_v <= p' <= r_f,   else p goes towards u at the limit
 

@@ -16,8 +16,8 @@ MEMORY = 1
 STEP_S = 2e-3
 COMPLAINT = "lost calibration"
 LOOKS = (
-    "The indicated position rounds off every start and stop; after the stem has stuck it still creeps, exponentially, "
-    "to its end."
+    "The indication rounds off every start and stop. After the stem has stuck, the indication still creeps, "
+    "exponentially, to its end."
 )
 CONFOUNDED = {
     "ip_lag": "measured actuator pressure; failing that, how abruptly a slip stops: the sensor's lag rounds it, the "

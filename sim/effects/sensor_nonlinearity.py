@@ -14,7 +14,7 @@ LOOKS = "The static curve is bent, both branches alike, and true at both ends."
 CONFOUNDED = {
     "spring_hardening": "the width of the dead band over the travel, which a bent sensor stretches and squeezes",
     "flow_force": "the width of the dead band over the travel, which a bent sensor stretches and squeezes",
-    "area_variation": "fast moves, in which the pressure parts from the static curve",
+    "area_variation": "fast moves, in which the pressure leaves the static curve",
 }
 INVERSE = "balance"
 

@@ -13,7 +13,7 @@ COMPLAINT = "spring or diaphragm"
 LOOKS = "The static curve bends: the same step of pressure moves the stem less, the further it is open."
 CONFOUNDED = {
     "flow_force": "travel to both ends: the spring bends the curve late, the flow force evenly",
-    "area_variation": "fast moves, in which the pressure parts from the static curve",
+    "area_variation": "fast moves, in which the pressure leaves the static curve",
     "sensor_nonlinearity": "the width of the dead band over the travel, which a bent sensor stretches and squeezes",
 }
 INVERSE = "balance"

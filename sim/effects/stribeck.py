@@ -1,4 +1,4 @@
-"""A further fall of friction with speed, over speeds of its own.
+"""Friction falls with speed a second time, over its own range of speeds.
 
     F_f(v) -> F_f(v) + F_x exp(-(|v| / v_x)^n)
 
@@ -14,8 +14,8 @@ from sim.effect import Parameter
 
 COMPLAINT = "sticks"
 LOOKS = (
-    "Stick-slip: break-away is late and the jump that follows long. Steady motion slower than v_x is rough or not "
-    "to be had; faster motion is untouched."
+    "Stick-slip: break-away is late and the jump that follows long. Steady motion slower than v_x is rough or "
+    "impossible; faster motion is untouched."
 )
 CONFOUNDED = {
     "static_n": "moves slow enough that the velocity stays about v_x: a ramp",

@@ -1,4 +1,4 @@
-"""The supply pressure is all there is, and the exhaust lets not all of it go.
+"""The pressure stays between what the exhaust leaves and what the supply gives.
 
     p = min(max(u, p_e), p_s)
 
@@ -11,10 +11,10 @@ from config.extended_valve import Inverse
 from sim.effect import Parameter
 
 COMPLAINT = "air supply or leak"
-LOOKS = "Beyond a command, always the same one, the stem answers no further, at the upper end, at the lower or both."
+LOOKS = "Beyond one command, always the same, the stem moves no further: at the upper end, the lower end, or both."
 CONFOUNDED = {
-    "end_stop": "measured actuator pressure: the limit cuts it, a stop does not. Without it: a load that moves the "
-    "place where the stem halts moves only the limit's",
+    "end_stop": "measured actuator pressure: the limit cuts it, a stop does not. Without it, another load: it "
+    "shifts the place where a limit halts the stem, and not that of a stop",
 }
 
 

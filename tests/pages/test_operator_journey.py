@@ -119,7 +119,9 @@ def signed_in_as_operator(page: Page) -> None:
     sign_in(page, "operator", PASSWORDS["operator"])
     expect(page.get_by_test_id("set-reference")).to_be_enabled()
     expect(page.get_by_test_id("mode-automatic")).to_be_disabled()
-    expect(page.get_by_test_id("rights")).to_contain_text("for mode, pressure, identification sign in as engineer")
+    expect(page.get_by_test_id("rights")).to_contain_text(
+        "to write mode, pressure, identification, sign in as engineer"
+    )
     page.get_by_test_id("door").click()
     expect(page.get_by_test_id("set-reference")).to_be_disabled()
 

@@ -91,13 +91,13 @@ def test_what_another_does_as_well_is_one_of_them_and_what_would_tell_is_said(pa
     found = diagnosed(parts, step(POOR, dead_time=model_of("dead_time"), sensor_lag=model_of("sensor_lag")))
     assert found.verdict == "one_of"
     assert found.indistinguishable == (("dead_time", "sensor_lag"),)
-    assert " dead_time or sensor_lag: the shape of a slip: the dead time leaves it as it is" in found.sentence
+    assert " To tell dead_time from sensor_lag, look at the shape of a slip: the dead time leaves it" in found.sentence
 
 
 def test_of_what_no_record_tells_apart_it_is_said_so(parts: Split) -> None:
     found = diagnosed(parts, step(POOR, sensor_offset=model_of("sensor_offset"), preload=model_of("preload")))
     assert (found.verdict, found.missing) == ("one_of", ("preload",))
-    assert " preload or sensor_offset: no record of pressure and position tells." in found.sentence
+    assert " No record of pressure and position tells preload from sensor_offset." in found.sentence
 
 
 def test_a_valve_that_explains_all_is_adequate(parts: Split) -> None:
@@ -274,7 +274,7 @@ def test_an_adequate_valve_that_scatters_is_told_so_and_one_that_does_not_is_not
 def test_rivals_are_told_with_what_would_tell_them_apart() -> None:
     assert rivals_sentence(["ip_lag"], LIBRARY) == ""
     assert "measured actuator pressure" in rivals_sentence(["ip_lag", "sensor_lag"], LIBRARY)
-    assert "no record of pressure and position tells" in rivals_sentence(["preload", "sensor_offset"], LIBRARY)
+    assert "No record of pressure and position tells" in rivals_sentence(["preload", "sensor_offset"], LIBRARY)
     assert rivals_sentence(["stribeck", "area_variation"], LIBRARY) == " Equally good: stribeck, area_variation."
 
 

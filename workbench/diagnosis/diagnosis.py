@@ -170,7 +170,7 @@ class Diagnosis(Result, ForwardSelection[EvaluatedModel, EffectCandidate]):
             said.append(candidate_table([each.tried for each in step.candidates], lengths(self.kind), title))
         if self.experiment:
             said.append(
-                f"experiment: {self.experiment.name}; after a refit the rivals differ by "
+                f"experiment: {self.experiment.name}; even after a refit, the rivals' answers differ by "
                 f"{self.experiment.separation:.3g} times the noise"
             )
         return said + [f"not detectable: {each.sentence}" for each in undetectable(self.split, self.best.fit.valve)]

@@ -45,7 +45,7 @@ class ExtensionStep(Schema):
         length = extension.extended.kind.length
         found, before, after = extension.gain, extension.refitted_errors, extension.extended_errors
         said = (
-            f"evidence {found.bic:.4g}; the error in a typical held-out second goes from "
+            f"evidence {found.bic:.4g}; the error of the median held-out move goes from "
             f"{length.number(before.test_block_m, '.4g')} to {length.said(after.test_block_m, '.4g')}, "
             f"held-out evidence {found.held_out_evidence:.3g}"
         )

@@ -1,6 +1,7 @@
 """A verdict in a sentence: what is missing, by how much the error fell, and what would tell rivals apart."""
 
 from collections.abc import Mapping, Sequence
+from itertools import combinations
 
 from config.drive import Kind, Scale
 from sim.composition import BASE, COULOMB, STATIC
@@ -195,13 +196,12 @@ def rivals_sentence(names: Sequence[str], library: Mapping[str, Effect]) -> str:
     """Say what would tell equally good effects apart, with a leading space; empty for fewer than two."""
     if len(names) < 2:
         return ""
-    texts = [
-        f" {name} or {other}: "
-        f"{distinguishing_record(name, other, library) or 'no record of pressure and position tells'}."
-        for i, name in enumerate(names)
-        for other in names[i + 1 :]
-        if distinguishing_record(name, other, library) or len(classes((name, other), library)) == 1
-    ]
+    texts = []
+    for name, other in combinations(names, 2):
+        if record := distinguishing_record(name, other, library):
+            texts.append(f" To tell {name} from {other}, look at {record}.")
+        elif len(classes((name, other), library)) == 1:
+            texts.append(f" No record of pressure and position tells {name} from {other}.")
     return "".join(texts) or f" Equally good: {', '.join(names)}."
 
 

@@ -150,7 +150,9 @@ def _overlay(each: Comparison) -> Html:
         by_setpoint=each.by_setpoint,
         read=Reading(each.own),
     )
-    return overlaid(figure, "The ground shows what the measured stem is doing; white: it rests.", each.time_s.size)
+    return overlaid(
+        figure, "The background colour shows what the measured stem does; white: it rests.", each.time_s.size
+    )
 
 
 def overlaid(figure: Figure, ground: str, samples: int) -> Html:
@@ -251,11 +253,11 @@ def _friction(each: Comparison) -> Html:
 
     return section(
         "friction",
-        "Friction, as the balance of forces leaves it over",
+        "Friction, from the balance of forces",
         text(
-            "Pressure times diaphragm area, less spring, less inertia: what remains while the stem moves is friction, "
-            "and any force that the model lacks. Drawn from the measurement and, in the same way, from the model. "
-            "Where the two part, something is missing that depends on that velocity or that position."
+            "While the stem moves, pressure times area less spring and inertia is friction, with any force that the "
+            "model lacks. It is drawn from the measurement, and in the same way from the model. Where they differ, the "
+            "model lacks something that depends on this velocity or this position."
         ),
         plot("plot-friction-velocity", draw_way("over_velocity"), 330, "Friction over velocity."),
         pair(

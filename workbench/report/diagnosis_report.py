@@ -219,7 +219,7 @@ def _overlay(validation: _Validation) -> Html:
         by_setpoint=base.by_setpoint,
         read=Reading(base.own),
     )
-    told = "All of it was held out." if whole else "On the green ground: what was held out."
+    told = "All of it was held out." if whole else "Green background: held out."
     return overlaid(figure, told, base.time_s.size)
 
 

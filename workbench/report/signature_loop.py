@@ -16,8 +16,8 @@ from workbench.report.units import Reading
 MOST_LOOP_POINTS = 6000
 """Points drawn of one loop at most."""
 TOLD = (
-    "Position over command. Friction widens the loop, the spring tilts it, a preload or a sensor's offset shifts it; "
-    "where measurement and model part, the model lacks something there."
+    "Position over command. Friction widens the loop, the spring tilts it, a preload or a sensor's offset shifts it. "
+    "Where measurement and model differ, the model lacks something."
 )
 
 

@@ -43,12 +43,14 @@ def add_export_arguments(parser: argparse.ArgumentParser) -> None:
         type=_pressure,
         nargs=2,
         metavar=("AT0", "AT100"),
-        help="pressures of 0 %% and 100 %% (20e3 100e3, with a note)",
+        help="pressures of 0 %% and 100 %% (20e3 100e3; a note says so)",
     )
     export.add_argument(
         "--period-s", type=_period, metavar="S", help="time between the rows of a file without a time column"
     )
-    export.add_argument("--decimal", choices=(".", ","), help="the decimal sign, where the file leaves it open")
+    export.add_argument(
+        "--decimal", choices=(".", ","), metavar="SIGN", help="decimal sign, . or , (the file's, where it is clear)"
+    )
     export.add_argument(
         "--time-format",
         metavar="FORMAT",
@@ -59,7 +61,7 @@ def add_export_arguments(parser: argparse.ArgumentParser) -> None:
         action="append",
         default=[],
         metavar="THEIRS=GOOD,..",
-        help="a status column and its good words; other rows have no values",
+        help="a status column and the words that mean good; other rows are read without values",
     )
     export.add_argument(
         "--sheet", metavar="NAME", help="sheet of a workbook, or group of TDMS or MDF, where several have the columns"

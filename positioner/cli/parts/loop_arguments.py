@@ -29,7 +29,9 @@ def add_loop_arguments(parser: argparse.ArgumentParser) -> None:
         metavar=("AT0", "AT100"),
         help="numbers of the file for 0 %% and 100 %% of OP",
     )
-    columns.add_argument("--decimal", choices=(".", ","), help="the decimal sign, where the file leaves it open")
+    columns.add_argument(
+        "--decimal", choices=(".", ","), metavar="SIGN", help="decimal sign, . or , (the file's, where it is clear)"
+    )
     columns.add_argument("--time-format", metavar="FORMAT", help='format of the dates, as "%%d.%%m.%%Y %%H:%%M:%%S"')
 
 
