@@ -5,7 +5,7 @@ from math import inf
 import numpy as np
 import pytest
 
-from positioner.estimation.landings.breakaway_distance import CLOSE, BreakawayDistance, Interval, Local, Went
+from positioner.estimation.landings.breakaway_distance import CLOSE, BreakawayDistance, Interval, Went
 
 KNOWN = Interval(1.0e-3, 1.1e-3, seen=True)
 ALL = BreakawayDistance(KNOWN, KNOWN, KNOWN, KNOWN)
@@ -94,26 +94,16 @@ def test_turning_that_is_shorter_than_going_on_is_found_though_nothing_of_it_has
     for _ in range(12):
         way_m = both.at(-1, turning=True).likely_m
         went = Went(way_m, way_m * (way_m >= 1.36e-3), moved=way_m >= 1.36e-3, arrived=way_m >= 1.36e-3)
-        both = both.taught(-1, went, turning=True, local=Local())
+        both = both.taught(-1, went, turning=True, local=1.0)
     assert 1.36e-3 <= both.at(-1, turning=True).likely_m <= CLOSE**2 * 1.36e-3
 
 
 def test_it_goes_over_the_travel_as_friction_over_slope_and_comes_back() -> None:
-    local = Local(up=0.7, down=0.8, friction=1.2)
-    assert ALL.at(1, turning=False, local=local).broke_m == pytest.approx(0.7 * 1.1e-3)
+    assert ALL.at(1, turning=False, local=0.7).broke_m == pytest.approx(0.7 * 1.1e-3)
     went = Went(0.72e-3, 0.72e-3, moved=True, arrived=True)
-    back = ALL.taught(1, went, turning=False, local=local)
+    back = ALL.taught(1, went, turning=False, local=0.7)
     assert back.onward_up.broke_m == pytest.approx(0.72e-3 / 0.7)
     assert back.onward_down == KNOWN
-
-
-def test_what_a_packing_gives_way_goes_with_friction_alone_and_play_is_the_same_everywhere() -> None:
-    soft = BreakawayDistance(KNOWN, KNOWN, Interval(2.9e-3, 3.0e-3, seen=True), KNOWN)
-    there = soft.at(1, turning=True, local=Local(up=0.7, down=0.7, friction=1.2))
-    assert there.broke_m == pytest.approx(0.7 * 1.1e-3 + 1.2 * 1.9e-3, rel=1e-6)
-    played = BreakawayDistance(KNOWN, KNOWN, Interval(0.2e-3, 0.3e-3, seen=True), KNOWN)
-    there = played.at(1, turning=True, local=Local(up=1.2, down=1.2, friction=1.2))
-    assert there.broke_m == pytest.approx(1.2 * 1.0e-3 - 0.7e-3, rel=1e-6)
 
 
 def test_where_nothing_is_known_nothing_is_made_up() -> None:

@@ -21,7 +21,7 @@ An interval of which one side is missing has its next of kin's, if that agrees. 
 loose, what held a kin is believed less a factor; and once a way that held the kin has broken it loose, the next is less
 by that factor, until one of its own holds. For a play that is taken up makes turning shorter than going on, and a
 packing that gives way longer. It is kept as in the middle of the travel, and goes over it as friction over slope does,
-φ/κ; what turning takes besides as friction.
+φ/κ.
 """
 
 from dataclasses import dataclass, replace
@@ -43,22 +43,6 @@ FADES, FADED = 0.999, 0.5
 broke to which it fades, and no farther."""
 LONG = 2.0
 """Times broke: a slide longer than this says nothing."""
-SHRINKS = 0.25
-"""Factor on a distance from place to place, at the least."""
-
-
-class Local(NamedTuple):
-    """What a place of the travel has of what the middle has: factors."""
-
-    up: float = 1.0
-    down: float = 1.0
-    """Of φ/κ, in the direction."""
-    friction: float = 1.0
-    """Of φ."""
-
-    def on(self, direction: int) -> float:
-        """Return the factor on what going on takes."""
-        return self.up if direction > 0 else self.down
 
 
 class Went(NamedTuple):
@@ -144,7 +128,6 @@ class Interval:
 
 
 UNKNOWN = Interval()
-MIDDLE = Local()
 
 
 class BreakawayDistance(NamedTuple):
@@ -155,34 +138,18 @@ class BreakawayDistance(NamedTuple):
     turning_up: Interval = UNKNOWN
     turning_down: Interval = UNKNOWN
 
-    def at(self, direction: int, *, turning: bool, local: Local = MIDDLE) -> Interval:
+    def at(self, direction: int, *, turning: bool, local: float = 1.0) -> Interval:
         """Return the interval of slides in a direction at a place; what it lacks is its next of kin's."""
         own = self[_index(direction, turning=turning)]
         for s, t in ((direction, not turning), (-direction, turning), (-direction, not turning)):
             own = own.filled(self[_index(s, turning=t)])
-        return own.times(self._factor(direction, local, turning=turning))
+        return own.times(local)
 
-    def taught(self, direction: int, went: Went, *, turning: bool, local: Local) -> "BreakawayDistance":
-        """Return the distances after a slide in a direction."""
-        factor, own = self._factor(direction, local, turning=turning), _index(direction, turning=turning)
-        there = self[own].times(factor).taught(went, turning=turning)
-        return self._replace(**{self._fields[own]: there.times(1.0 / factor)})
-
-    def _factor(self, direction: int, local: Local, *, turning: bool) -> float:
-        """Return by what factor a distance at a place differs from that in the middle.
-
-        Going on is taken for as much of turning as what held and what broke loose let it be; play is alike everywhere.
-        """
-        by = local.on(direction)
-        if not turning or by == local.friction == 1.0:
-            return by
-        on, turns = (self[_index(direction, turning=each)] for each in (False, True))
-        turns_m = turns.broke_m
-        if turns_m == inf:
-            return by
-        on_m = max(on.held_m, min(turns_m, on.broke_m))
-        rest_m = turns_m - on_m
-        return max(SHRINKS, (on_m * by + rest_m * (local.friction if rest_m > 0.0 else 1.0)) / turns_m)
+    def taught(self, direction: int, went: Went, *, turning: bool, local: float) -> "BreakawayDistance":
+        """Return the distances after a slide in a direction at a place, of which the factor is given."""
+        own = _index(direction, turning=turning)
+        there = self[own].times(local).taught(went, turning=turning)
+        return self._replace(**{self._fields[own]: there.times(1.0 / local)})
 
 
 def _index(direction: int, *, turning: bool) -> int:

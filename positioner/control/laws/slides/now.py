@@ -10,7 +10,6 @@ from config.codes import InhibitReason
 from positioner.control.laws.boundary import Seen
 from positioner.control.laws.slides.slide_balance import Balance
 from positioner.control.laws.slides.slide_bounds import SlideBounds
-from positioner.estimation.landings.breakaway_distance import Local
 from positioner.estimation.landings.landing_detector import SlideOutcome
 from positioner.estimation.landings.stem_at_rest import Rest
 
@@ -54,7 +53,7 @@ class Now:
         )
 
     @cached_property
-    def local(self) -> Local:
+    def local(self) -> float:
         """What break-away distances at the reference are of those in the middle of the travel."""
         return self.balance.local(self.reference_m)
 

@@ -10,8 +10,9 @@ Where friction grows over the travel its static part grows alike, so d_s goes as
 from dataclasses import dataclass, replace
 from functools import cached_property
 
+from config.extended_valve import ExtendedValve
 from positioner.control.laws.slides.slide_bounds import THRESHOLDS
-from positioner.estimation.landings.breakaway_distance import BreakawayDistance, Interval, Local
+from positioner.estimation.landings.breakaway_distance import BreakawayDistance, Interval
 from positioner.estimation.landings.landing_detector import VISIBLE, SlideOutcome
 from positioner.estimation.landings.local_balance import LocalBalance
 
@@ -43,33 +44,27 @@ class Balance(LocalBalance):
         """F_c/k_s, m."""
         return self.ratios.k_over_c / self.ratios.b_over_c
 
-    def friction_at_m(self, position_m: float) -> float:
-        """Return φ/κ at a place, κ of the straight law, m."""
-        apart_pa = self._shape_pa(position_m, 1) - self._shape_pa(position_m, -1)
-        return max(THRESHOLDS.flattest * self.friction_m, 0.5 * apart_pa / -self.ratios.b_over_c)
-
-    def going_on_m(self, position_m: float, direction: int) -> float:
-        """Return what margins of slides that go on are in proportion to, m: m_s of an extended valve, or φ/κ."""
+    def going_on_m(self, position_m: float) -> float:
+        """Return what break-away distances at a place are in proportion to, m: m_s of an extended valve, or φ/κ."""
         if self.valve is not None:
-            return max(THRESHOLDS.return_margin * self.valve.margin_m(position_m, direction), VISIBLE * self.stroke_m)
+            return 0.5 * sum(self._margin_m(self.valve, position_m, s) for s in (1, -1))
+        apart_pa = self._shape_pa(position_m, 1) - self._shape_pa(position_m, -1)
+        friction_m = max(THRESHOLDS.flattest * self.friction_m, 0.5 * apart_pa / -self.ratios.b_over_c)
         there_m = [position_m + each * THRESHOLDS.slope_reach * self.stroke_m for each in (-1, 1)]
         down_pa, up_pa = (sum(self._shape_pa(each, s) for s in (1, -1)) for each in there_m)
         straight_pa = -self.ratios.b_over_c * 4 * THRESHOLDS.slope_reach * self.stroke_m
-        return self.friction_at_m(position_m) / max(THRESHOLDS.flattest, (up_pa - down_pa) / straight_pa)
+        return friction_m / max(THRESHOLDS.flattest, (up_pa - down_pa) / straight_pa)
 
-    def local(self, position_m: float) -> Local:
-        """Return what break-away distances at a place are of those in the middle of the travel."""
-        there, middle = self._going(position_m), self._middle
-        return Local(*(each / in_the_middle for each, in_the_middle in zip(there, middle, strict=True)))
+    def _margin_m(self, valve: ExtendedValve, position_m: float, direction: int) -> float:
+        return max(THRESHOLDS.return_margin * valve.margin_m(position_m, direction), VISIBLE * self.stroke_m)
+
+    def local(self, position_m: float) -> float:
+        """Return what break-away distances at a place are of those in the middle of the travel, a factor."""
+        return self.going_on_m(position_m) / self._middle_m
 
     @cached_property
-    def _middle(self) -> tuple[float, float, float]:
-        return self._going(THRESHOLDS.middle * self.stroke_m)
-
-    def _going(self, position_m: float) -> tuple[float, float, float]:
-        """Return what slides up and down are in proportion to at a place, and what friction is, m."""
-        up_m, down_m = (self.going_on_m(position_m, s) for s in (1, -1))
-        return up_m, down_m, self.friction_at_m(position_m)
+    def _middle_m(self) -> float:
+        return self.going_on_m(THRESHOLDS.middle * self.stroke_m)
 
     def first_distances(self, guess_m: float, *, told: bool) -> BreakawayDistance:
         """Return the break-away distances before a slide of the law: those of the extended valve, or of the staircase.
@@ -79,7 +74,7 @@ class Balance(LocalBalance):
             told: whether that is known, and no guess.
         """
         if self.valve is not None:
-            up_m, down_m = (self.going_on_m(THRESHOLDS.middle * self.stroke_m, s) for s in (1, -1))
+            up_m, down_m = (self._margin_m(self.valve, THRESHOLDS.middle * self.stroke_m, s) for s in (1, -1))
             up, down = (Interval(each / THRESHOLDS.return_margin, each, seen=True) for each in (up_m, down_m))
             return BreakawayDistance(up, down, up, down)
         return BreakawayDistance(*(self._first(s, Interval(broke_m=guess_m, seen=told)) for s in (1, -1)))
@@ -95,7 +90,7 @@ class Balance(LocalBalance):
 
     def _in_the_middle_m(self, each: SlideOutcome, way_m: float) -> float:
         """Return what a way, m, that slide began would be in the middle of the travel."""
-        return way_m / self.local(each.from_m).on(each.direction)
+        return way_m / self.local(each.from_m)
 
     def _shape_pa(self, position_m: float, direction: int) -> float:
         """Return B as it goes over the travel, Pa, without what only the last landings near a place say."""
