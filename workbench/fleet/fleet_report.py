@@ -13,18 +13,7 @@ from pathlib import Path
 from workbench.fleet.examination import Examination
 from workbench.fleet.fleet import Fleet, since_day
 from workbench.fleet.valve_course import ValveCourse
-from workbench.report.page import (
-    Html,
-    Row,
-    fold_parts,
-    heading_alone,
-    keep_lines,
-    link_to,
-    section,
-    table,
-    text,
-    write_without_plots,
-)
+from workbench.report import page
 from workbench.report.units import OF_VALVE, Shown
 
 WIDTH_PX, HEIGHT_PX, RADIUS_PX = 120, 24, 2
@@ -45,66 +34,70 @@ def report_fleet(fleet: Fleet, path: Path, manifest: str, reports: Mapping[str, 
         InputError: the file cannot be written.
     """
     facts = f"{len(fleet.courses)} valves, {fleet.count} recordings, {len(fleet.bad)} unreadable"
-    parts = [heading_alone(f"Fleet of {manifest}", facts), _ranking(fleet)]
+    parts = [page.heading_alone(f"Fleet of {manifest}", facts), _ranking(fleet)]
     seen_from = path.resolve().parent
     links = {name: relpath(each.resolve(), seen_from) for name, each in (reports or {}).items()}
     parts += [
         _drill_down(rank, course, links.get(course.name)) for rank, course in enumerate(fleet.complaining, start=1)
     ]
     if fleet.bad:
-        rows = [Row((name, entry.recording, reason)) for name, entry, reason in fleet.bad]
-        bad = table("bad", ("valve", "recording", "why"), rows, words=(0, 1, 2))
-        parts.append(section("unreadable", "Recordings that could not be examined", bad))
+        rows = [page.Row((name, entry.recording, reason)) for name, entry, reason in fleet.bad]
+        bad = page.table("bad", ("valve", "recording", "why"), rows, words=(0, 1, 2))
+        parts.append(page.section("unreadable", "Recordings that could not be examined", bad))
     nothing_known = {course.name for course in fleet.unknown}
     well = [each.name for each in fleet.courses if not each.gravest and each.name not in nothing_known]
-    parts.append(section("well", "Valves without a finding", text(", ".join(well) or "none")))
+    parts.append(page.section("well", "Valves without a finding", page.text(", ".join(well) or "none")))
     if nothing_known:
-        parts.append(section("unknown", "Valves that could not be judged", text(", ".join(sorted(nothing_known)))))
-    write_without_plots(path, f"Fleet of {manifest}", parts)
+        parts.append(
+            page.section("unknown", "Valves that could not be judged", page.text(", ".join(sorted(nothing_known))))
+        )
+    page.write_without_plots(path, f"Fleet of {manifest}", parts)
 
 
-def _ranking(fleet: Fleet) -> Html:
+def _ranking(fleet: Fleet) -> page.Html:
     rows = [
-        Row(
+        page.Row(
             (str(rank), course.name, course.kind, since_day(course), _share(course), course.sure, ""),
             kind="over",
-            picture=link_to(f"#history-{rank}", sparkline(course)),
+            picture=page.link_to(f"#history-{rank}", sparkline(course)),
         )
         for rank, course in enumerate(fleet.complaining, start=1)
     ]
     if not rows:
-        return section("ranking", "Valves that need attention", text("None: all follow their last models."))
+        return page.section("ranking", "Valves that need attention", page.text("None: all follow their last models."))
     head = ("rank", "valve", "what", "since", "off by, % of stroke", "sure", "error over time")
     legend = (
         "Error over time: of the last valid model, in floors, on a logarithmic scale. Press it for the valve's history."
     )
-    ranked = table("ranked", head, rows, words=(1, 2, 3, 5, 6))
-    return section("ranking", "Valves that need attention", ranked, text(legend))
+    ranked = page.table("ranked", head, rows, words=(1, 2, 3, 5, 6))
+    return page.section("ranking", "Valves that need attention", ranked, page.text(legend))
 
 
-def _drill_down(rank: int, course: ValveCourse, report: str | None) -> Html:
+def _drill_down(rank: int, course: ValveCourse, report: str | None) -> page.Html:
     assert course.gravest
     entry, found = course.gravest
     history = [
-        Row((each.time.date().isoformat(), each.recording, _outcome(came), OF_VALVE.length(came.error_before_m)))
+        page.Row((each.time.date().isoformat(), each.recording, _outcome(came), OF_VALVE.length(came.error_before_m)))
         for each, came in course.examined
     ]
-    tried = [Row((each.name, OF_VALVE.length(each.held_out_m), each.remark or "accepted")) for each in found.candidates]
-    models = [Row((f"{each.when:%Y-%m-%d}", each.recording, each.found.sentence)) for each in course.models]
+    tried = [
+        page.Row((each.name, OF_VALVE.length(each.held_out_m), each.remark or "accepted")) for each in found.candidates
+    ]
+    models = [page.Row((f"{each.when:%Y-%m-%d}", each.recording, each.found.sentence)) for each in course.models]
     command = f"positioner diagnose {entry.recording} --valve {entry.file} --report {course.name}.html"
-    return fold_parts(
+    return page.fold_parts(
         f"valve-{rank}",
         f"{rank}. {course.name}: {course.kind}",
-        text(found.sentence),
-        link_to(report, Html("The diagnosis report")) if report else Html(""),
-        table(f"history-{rank}", ("when", "recording", "result", "error before, mm"), history, words=(0, 1, 2)),
-        table(f"models-{rank}", ("model from", "by", "why"), models, words=(0, 1, 2)) if models else Html(""),
-        table(f"tried-{rank}", ("effect", "held out, mm", ""), tried, words=(0, 2)) if tried else Html(""),
-        keep_lines(command),
+        page.text(found.sentence),
+        page.link_to(report, page.Html("The diagnosis report")) if report else page.Html(""),
+        page.table(f"history-{rank}", ("when", "recording", "result", "error before, mm"), history, words=(0, 1, 2)),
+        page.table(f"models-{rank}", ("model from", "by", "why"), models, words=(0, 1, 2)) if models else page.Html(""),
+        page.table(f"tried-{rank}", ("effect", "held out, mm", ""), tried, words=(0, 2)) if tried else page.Html(""),
+        page.keep_lines(command),
     )
 
 
-def sparkline(course: ValveCourse) -> Html:
+def sparkline(course: ValveCourse) -> page.Html:
     """Return the error of the valve's last model, in floors, over its recordings: low is well."""
     points = [_height(found) for _, found in course.readable]
     step = (WIDTH_PX - 2 * RADIUS_PX) / max(len(points) - 1, 1)
@@ -112,7 +105,7 @@ def sparkline(course: ValveCourse) -> Html:
     line = " ".join(f"{x:.1f},{y:.1f}" for x, y in places)
     dots = "".join(f'<circle cx="{x:.1f}" cy="{y:.1f}" r="{RADIUS_PX}" fill="currentColor"/>' for x, y in places)
     label = escape(f"error over the floor of {course.name}, {len(points)} recordings")
-    return Html(
+    return page.Html(
         f'<svg role="img" aria-label="{label}" width="{WIDTH_PX}" height="{HEIGHT_PX}">'
         f'<polyline points="{line}" fill="none" stroke="currentColor"/>{dots}</svg>'
     )

@@ -16,22 +16,8 @@ from workbench.loops.loop_diagnosis import REMEDIES, LoopDiagnosis
 from workbench.loops.loop_record import Array
 from workbench.loops.oscillation import without_trend
 from workbench.loops.plant import Plant
+from workbench.report import page
 from workbench.report.charts import EXTENDED, MEASURED, MODEL, QUIET, Figure, axis, layout, line
-from workbench.report.page import (
-    Html,
-    Row,
-    figures_of_merit,
-    fold_parts,
-    glossary,
-    heading_alone,
-    pair,
-    plot,
-    section,
-    table,
-    text,
-    verdict,
-    write,
-)
 from workbench.report.plot_series import draw_series, significant
 from workbench.report.units import Shown
 
@@ -57,13 +43,13 @@ def report_loop(found: Sequence[LoopDiagnosis], path: Path) -> None:
         InputError: plotly is not installed, or the file cannot be written.
     """
     title = "Loop " + ", ".join(each.record.name for each in found)
-    parts: list[Html] = []
+    parts: list[page.Html] = []
     for count, each in enumerate(found):
         name, facts = f"loop-{count}", f"{each.record.pv.size} samples, one each {each.record.period_s:g} s"
-        parts += [heading_alone(f"Loop {each.record.name}", facts), _verdict(each, name), _key_figures(each)]
+        parts += [page.heading_alone(f"Loop {each.record.name}", facts), _verdict(each, name), _key_figures(each)]
         parts += _pictures(each, name, DRAWN)
-        parts += [section(f"{name}-tables", "Causes held against each other", _tables(each, name))]
-    write(path, title, [*parts, section("words", "Words used here", glossary(WORDS))])
+        parts += [page.section(f"{name}-tables", "Causes held against each other", _tables(each, name))]
+    page.write(path, title, [*parts, page.section("words", "Words used here", page.glossary(WORDS))])
 
 
 def report_loops(plant: Plant, path: Path, manifest: str) -> None:
@@ -74,37 +60,41 @@ def report_loops(plant: Plant, path: Path, manifest: str) -> None:
     """
     counts = ", ".join(f"{plant.count(each)} {words}" for each, words in COUNTED.items())
     parts = [
-        heading_alone(
+        page.heading_alone(
             f"Loops of {manifest}", f"{len(plant.ranked)} loops: {counts}; {len(plant.unreadable)} unreadable"
         ),
-        section("ranking", "Ranking", _page_table("loops", plant.ranking)),
+        page.section("ranking", "Ranking", _page_table("loops", plant.ranking)),
     ]
     if plant.groups:
         head = ("Loops", "Period, s", "Likeliest source", "Because")
-        rows = [Row((", ".join(g.loops), f"{g.period_s:.4g}", g.source, g.because)) for g in plant.groups]
-        parts.append(section("together", "Loops that oscillate together", table("groups", head, rows, (0, 2, 3))))
+        rows = [page.Row((", ".join(g.loops), f"{g.period_s:.4g}", g.source, g.because)) for g in plant.groups]
+        parts.append(
+            page.section("together", "Loops that oscillate together", page.table("groups", head, rows, (0, 2, 3)))
+        )
     for count, each in enumerate(plant.ranked[:MOST_DRILLED]):
         name = f"loop-{count}"
         inside = [_verdict(each, name), *_pictures(each, name, FEWER), _tables(each, name)]
-        parts.append(fold_parts(name, f"{count + 1}. {each.record.name}: {each.verdict}", *inside))
+        parts.append(page.fold_parts(name, f"{count + 1}. {each.record.name}: {each.verdict}", *inside))
     if plant.unreadable:
-        rows = [Row(each) for each in plant.unreadable]
-        parts.append(section("unreadable", "Unreadable", table("bad", ("Loop", "Why"), rows, (0, 1))))
-    write(path, f"Loops of {manifest}", [*parts, section("words", "Words used here", glossary(WORDS))])
+        rows = [page.Row(each) for each in plant.unreadable]
+        parts.append(page.section("unreadable", "Unreadable", page.table("bad", ("Loop", "Why"), rows, (0, 1))))
+    page.write(path, f"Loops of {manifest}", [*parts, page.section("words", "Words used here", page.glossary(WORDS))])
 
 
 COUNTED = {"sticks": "stick", "something else": "of another cause", "cannot be told": "that cannot be told"}
 
 
-def _verdict(each: LoopDiagnosis, name: str) -> Html:
-    said = text(*filter(None, (each.advice, *each.record.notes)))
+def _verdict(each: LoopDiagnosis, name: str) -> page.Html:
+    said = page.text(*filter(None, (each.advice, *each.record.notes)))
     if each.remedies:
-        said = Html(said + _page_table(f"{name}-remedies", each.remedy_table) + text(REMEDIES.rstrip(":") + "."))
-    return verdict(KIND[each.verdict], each.sentence, said)
+        said = page.Html(
+            said + _page_table(f"{name}-remedies", each.remedy_table) + page.text(REMEDIES.rstrip(":") + ".")
+        )
+    return page.verdict(KIND[each.verdict], each.sentence, said)
 
 
-def _key_figures(each: LoopDiagnosis) -> Html:
-    return figures_of_merit(
+def _key_figures(each: LoopDiagnosis) -> page.Html:
+    return page.figures_of_merit(
         [
             ("Sticks, %", Shown(each.sticks_said), "calibrated by loop"),
             ("Apparent stiction, % of the output", Shown(each.stiction_said), "95 % interval"),
@@ -114,28 +104,28 @@ def _key_figures(each: LoopDiagnosis) -> Html:
     )
 
 
-def _tables(each: LoopDiagnosis, name: str) -> Html:
+def _tables(each: LoopDiagnosis, name: str) -> page.Html:
     votes = _page_table(f"{name}-votes", each.vote_table)
     if each.causes is None:
-        return Html(text("No causes were compared: the record is insufficient.") + votes)
-    return Html(_page_table(f"{name}-causes", each.cause_table) + votes)
+        return page.Html(page.text("No causes were compared: the record is insufficient.") + votes)
+    return page.Html(_page_table(f"{name}-causes", each.cause_table) + votes)
 
 
-def _page_table(name: str, each: Table) -> Html:
+def _page_table(name: str, each: Table) -> page.Html:
     words = [column for column in range(len(each.headings)) if each.is_words(column)]
     head = [heading.capitalize() for heading in each.headings]
-    rows = [Row(tuple(row), kind="over" if "sticks" in row[:2] else "") for row in each.rows]
-    return table(name, head, rows, words)
+    rows = [page.Row(tuple(row), kind="over" if "sticks" in row[:2] else "") for row in each.rows]
+    return page.table(name, head, rows, words)
 
 
-def _pictures(each: LoopDiagnosis, name: str, most: int) -> list[Html]:
+def _pictures(each: LoopDiagnosis, name: str, most: int) -> list[page.Html]:
     friction = each.causes.friction if each.causes and each.verdict != "something else" else None
     path = fitted_path(each.record, each.oscillation, friction) if friction else None
     return [
-        plot(f"{name}-time", _over_time(each, path, most), 360, TIME_CAPTION),
-        pair(
-            plot(f"{name}-path", _over_output(each, path, most), 340, PATH_CAPTION),
-            plot(f"{name}-spectrum", _spectra(each, most), 340, SPECTRUM_CAPTION),
+        page.plot(f"{name}-time", _over_time(each, path, most), 360, TIME_CAPTION),
+        page.pair(
+            page.plot(f"{name}-path", _over_output(each, path, most), 340, PATH_CAPTION),
+            page.plot(f"{name}-spectrum", _spectra(each, most), 340, SPECTRUM_CAPTION),
         ),
     ]
 

@@ -9,25 +9,9 @@ from config.recording import period_text
 from workbench.compare.comparison import ADEQUATE, Comparison, Phase
 from workbench.compare.comparison_sentences import shorten_notes
 from workbench.compare.measures import fit_in_words
+from workbench.report import page
 from workbench.report.charts import MEASURED, MODEL, Figure, correlation, profiles, spectrum
 from workbench.report.overlay import Simulated, overlay, phase_shades
-from workbench.report.page import (
-    Html,
-    Row,
-    Subject,
-    bullets,
-    figures_of_merit,
-    fold_parts,
-    glossary,
-    heading,
-    pair,
-    plot,
-    section,
-    table,
-    text,
-    verdict,
-    write,
-)
 from workbench.report.plot_series import MOST_SERIES_POINTS, stretch
 from workbench.report.signature_loop import signature
 from workbench.report.units import Reading, Shown, of_stroke, times
@@ -53,7 +37,9 @@ LISTED = 12
 """Times of slips that are spelt out."""
 
 
-def report_comparison(comparison: Comparison, path: Path, subject: Subject, grown: Sequence[Html] = ()) -> None:
+def report_comparison(
+    comparison: Comparison, path: Path, subject: page.Subject, grown: Sequence[page.Html] = ()
+) -> None:
     """Write the report.
 
     Args:
@@ -67,12 +53,12 @@ def report_comparison(comparison: Comparison, path: Path, subject: Subject, grow
     """
     name = subject.valve.valve.name
     stroke_m = subject.valve.valve.stroke_m
-    write(
+    page.write(
         path,
         f"{comparison.own.noun} {name}: model against measurement",
         [
-            heading(f"{comparison.own.noun} “{name}”: model against measurement", subject, facts(comparison)),
-            verdict(*headline(comparison), bullets(comparison.sentences)),
+            page.heading(f"{comparison.own.noun} “{name}”: model against measurement", subject, facts(comparison)),
+            page.verdict(*headline(comparison), page.bullets(comparison.sentences)),
             _key_figures(comparison, stroke_m),
             _overlay(comparison),
             *([] if comparison.by_setpoint else [_signature(comparison)]),
@@ -82,7 +68,7 @@ def report_comparison(comparison: Comparison, path: Path, subject: Subject, grow
             _statistics(comparison),
             *grown,
             recording(subject, comparison.notes, _pressure(comparison)),
-            section("words", "Words used here", glossary(WORDS)),
+            page.section("words", "Words used here", page.glossary(WORDS)),
         ],
     )
 
@@ -108,10 +94,10 @@ def headline(each: Comparison) -> tuple[str, str]:
     return "bad", "The model does not hold. Where it fails:"
 
 
-def _key_figures(each: Comparison, stroke_m: float) -> Html:
+def _key_figures(each: Comparison, stroke_m: float) -> page.Html:
     missed, spurious = len(each.slips.missed_s), len(each.slips.spurious_s)
     read, floor = Reading(each.own), "sensor noise" if _is_noise(each) else "repeatability of the valve"
-    return figures_of_merit(
+    return page.figures_of_merit(
         [
             (read.title("Error, rms, mm"), read.length(each.rms_m), of_stroke(each.rms_m, stroke_m)),
             (
@@ -134,11 +120,11 @@ def _model(each: Comparison) -> Simulated:
     return Simulated("model", MODEL, each.simulated_m)
 
 
-def _signature(each: Comparison) -> Html:
+def _signature(each: Comparison) -> page.Html:
     return signature(each.command_pa, each.measured_m, [_model(each)], Reading(each.own))
 
 
-def _overlay(each: Comparison) -> Html:
+def _overlay(each: Comparison) -> page.Html:
     valid = np.isfinite(each.residual_m)
     figure = overlay(
         each.time_s,
@@ -155,12 +141,12 @@ def _overlay(each: Comparison) -> Html:
     )
 
 
-def overlaid(figure: Figure, ground: str, samples: int) -> Html:
+def overlaid(figure: Figure, ground: str, samples: int) -> page.Html:
     """Return the section of an overlay; `ground` says what the shades behind it mean."""
-    return section(
+    return page.section(
         "overlay",
         "Measured and simulated position",
-        plot(
+        page.plot(
             "plot-overlay",
             figure,
             640,
@@ -177,16 +163,16 @@ def thinning(count: int) -> str:
     return f" Of every {stretch(count)} samples the least and the greatest are drawn; the figures are of all {count}."
 
 
-def _phases(each: Comparison, stroke_m: float) -> Html:
+def _phases(each: Comparison, stroke_m: float) -> page.Html:
     read = Reading(each.own)
-    return section(
+    return page.section(
         "phases",
         "Where it fails",
-        text(
+        page.text(
             "The error by what the stem is doing. The mean says which way the model is off, "
             f"the last column how much of the whole (squared) error lies there. Marked: above {ADEQUATE:g} floors."
         ),
-        table(
+        page.table(
             "table-phases",
             [
                 "What the stem does",
@@ -199,10 +185,10 @@ def _phases(each: Comparison, stroke_m: float) -> Html:
             ],
             [_phase(part, each.floor_m, stroke_m, read) for part in each.phases if part.count],
         ),
-        text(
+        page.text(
             "The same error over the position, the velocity, the last direction and the pressure; bars: ± 1 std. error."
         ),
-        pair(
+        page.pair(
             _profile("position", each, "over the stem's position, mm", read.kind.length.factor),
             _profile("velocity", each, "over the stem's velocity, mm/s (opening +)", read.kind.length.factor),
             _profile("direction", each, "over the last direction of motion", 1.0),
@@ -211,8 +197,8 @@ def _phases(each: Comparison, stroke_m: float) -> Html:
     )
 
 
-def _phase(part: Phase, floor_m: float | None, stroke_m: float, read: Reading) -> Row:
-    return Row(
+def _phase(part: Phase, floor_m: float | None, stroke_m: float, read: Reading) -> page.Row:
+    return page.Row(
         [
             part.name,
             f"{part.count}",
@@ -231,16 +217,16 @@ def _mean_error(read: Reading) -> tuple[str, float, str, str]:
     return read.title("mean error, mm"), read.kind.length.factor, read.kind.length.unit, read.si
 
 
-def _profile(over: str, each: Comparison, title: str, factor: float) -> Html:
+def _profile(over: str, each: Comparison, title: str, factor: float) -> page.Html:
     read = Reading(each.own)
     title = read.title(title)
     figure = profiles([("error", MODEL, getattr(each, f"over_{over}"))], (title, factor), _mean_error(read))
     if over == "direction":
         figure["layout"]["xaxis"] |= {"tickvals": [-1, 1], "ticktext": ["closing", "opening"], "range": [-1.6, 1.6]}
-    return plot(f"plot-over-{over}", figure, 270, f"Mean error {title}.")
+    return page.plot(f"plot-over-{over}", figure, 270, f"Mean error {title}.")
 
 
-def _friction(each: Comparison) -> Html:
+def _friction(each: Comparison) -> page.Html:
     both = (("measured", MEASURED), ("model", MODEL))
     read = Reading(each.own)
     force = (read.title("friction, N"), 1.0, read.kind.force.si, read.kind.force.si)
@@ -251,23 +237,23 @@ def _friction(each: Comparison) -> Html:
         millimetres = "velocity, mm/s (opening +)" if way == "over_velocity" else "position, mm"
         return profiles(parts, (read.title(millimetres), read.kind.length.factor), force)
 
-    return section(
+    return page.section(
         "friction",
         "Friction, from the balance of forces",
-        text(
+        page.text(
             "While the stem moves, pressure times area less spring and inertia is friction, with any force that the "
             "model lacks. It is drawn from the measurement, and in the same way from the model. Where they differ, the "
             "model lacks something that depends on this velocity or this position."
         ),
-        plot("plot-friction-velocity", draw_way("over_velocity"), 330, "Friction over velocity."),
-        pair(
-            plot("plot-friction-opening", draw_way("opening_over_position"), 300, "Over position, while opening."),
-            plot("plot-friction-closing", draw_way("closing_over_position"), 300, "Over position, while closing."),
+        page.plot("plot-friction-velocity", draw_way("over_velocity"), 330, "Friction over velocity."),
+        page.pair(
+            page.plot("plot-friction-opening", draw_way("opening_over_position"), 300, "Over position, while opening."),
+            page.plot("plot-friction-closing", draw_way("closing_over_position"), 300, "Over position, while closing."),
         ),
     )
 
 
-def _slips(each: Comparison) -> Html:
+def _slips(each: Comparison) -> page.Html:
     slips, read = each.slips, Reading(each.own)
     rows = []
     for name, wanted in (("opening", 1), ("closing", -1)):
@@ -277,12 +263,12 @@ def _slips(each: Comparison) -> Html:
                 late_s = float(np.median([pair_.late_s for pair_ in found]))
                 farther_m = float(np.median([pair_.farther_m for pair_ in found]))
                 rows.append(
-                    Row([f"{name}, {when}", f"{len(found)}", f"{late_s:+.3f}", read.length(farther_m, sign=True)])
+                    page.Row([f"{name}, {when}", f"{len(found)}", f"{late_s:+.3f}", read.length(farther_m, sign=True)])
                 )
-    return section(
+    return page.section(
         "slips",
         "Slips: matched, missed, spurious",
-        text(
+        page.text(
             f"Matched: {len(slips.matched)}. Missed, the stem slipped and the model did not: {len(slips.missed_s)}"
             f"{_at(slips.missed_s)}. Spurious, the model slipped and the stem did not: {len(slips.spurious_s)}"
             f"{_at(slips.spurious_s)}."
@@ -291,9 +277,9 @@ def _slips(each: Comparison) -> Html:
     )
 
 
-def _list_slips(rows: list[Row], read: Reading) -> tuple[Html, Html]:
+def _list_slips(rows: list[page.Row], read: Reading) -> tuple[page.Html, page.Html]:
     head = ["Matched slips", "Number", "Model later by, s", read.title("Model farther by, mm")]
-    return table("table-slips", head, rows), text("Medians; a minus: earlier, or not far enough.")
+    return page.table("table-slips", head, rows), page.text("Medians; a minus: earlier, or not far enough.")
 
 
 def _at(times_s: tuple[float, ...]) -> str:
@@ -304,24 +290,24 @@ def _at(times_s: tuple[float, ...]) -> str:
     return f" (at {shown} s{f' and {rest} more' if rest > 0 else ''})"
 
 
-def _statistics(each: Comparison) -> Html:
+def _statistics(each: Comparison) -> page.Html:
     read = Reading(each.own)
-    return fold_parts(
+    return page.fold_parts(
         "statistics",
         "For specialists: correlations and spectrum of the error",
-        text(
+        page.text(
             "An error that correlates with the command shows that the model answers the command wrongly. Inside the "
             "grey band (99 %) nothing is proved. An error that correlates with itself alone may be the sensor's."
         ),
-        pair(
-            plot(
+        page.pair(
+            page.plot(
                 "plot-input-correlation",
                 correlation(each.input_correlation, "correlation"),
                 280,
                 f"Error with the command: {each.input_correlation.outside} of {each.input_correlation.lag.size} shifts "
                 "outside the band. Right of 0 the command comes first.",
             ),
-            plot(
+            page.plot(
                 "plot-autocorrelation",
                 correlation(each.autocorrelation, "correlation"),
                 280,
@@ -329,14 +315,14 @@ def _statistics(each: Comparison) -> Html:
                 "outside the band of white noise.",
             ),
         ),
-        plot("plot-spectrum", spectrum(each.spectrum, read), 280, "Spectrum of the error."),
-        plot(
+        page.plot("plot-spectrum", spectrum(each.spectrum, read), 280, "Spectrum of the error."),
+        page.plot(
             "plot-over-time",
             profiles([("error", MODEL, each.over_time)], ("time, s", 1.0), _mean_error(read)),
             250,
             "Mean error over time: a slope is drift.",
         ),
-        text(f"Robust error, median of the rms over blocks of 1 s: {read.said(each.robust_m)}."),
+        page.text(f"Robust error, median of the rms over blocks of 1 s: {read.said(each.robust_m)}."),
     )
 
 
@@ -355,8 +341,8 @@ def _pressure(each: Comparison) -> list[str]:
     ]
 
 
-def recording(subject: Subject, notes: tuple[str, ...], more: list[str]) -> Html:
+def recording(subject: page.Subject, notes: tuple[str, ...], more: list[str]) -> page.Html:
     """Return what is known of the recording itself."""
     said = [f"{key}: {value}" for key, value in subject.metadata.items()]
     whole = [] if notes else ["No samples were left out"]
-    return section("recording", "About the recording", bullets([*shorten_notes(notes), *whole, *more, *said]))
+    return page.section("recording", "About the recording", page.bullets([*shorten_notes(notes), *whole, *more, *said]))

@@ -13,28 +13,11 @@ from workbench.data.held_out import Split
 from workbench.diagnosis.diagnosis import Diagnosis
 from workbench.fit.fitted_parameter import Fitted
 from workbench.model.sampling import MORE_LANDINGS
-from workbench.report import ranking
+from workbench.report import page, ranking
 from workbench.report.charts import EXTENDED, MODEL, QUIET, axis, layout, line
 from workbench.report.comparison_report import MEANINGS, WORDS, facts, overlaid, recording
 from workbench.report.effects_table import RankedStep, headline, not_told_apart, ranks, show_added, show_tried
 from workbench.report.overlay import HELD_OUT, Mask, Shade, Simulated, overlay
-from workbench.report.page import (
-    Html,
-    Row,
-    Subject,
-    bullets,
-    figures_of_merit,
-    fold_parts,
-    glossary,
-    heading,
-    keep_lines,
-    plot,
-    section,
-    table,
-    text,
-    verdict,
-    write,
-)
 from workbench.report.plot_series import draw_series, round_values
 from workbench.report.signature_loop import signature
 from workbench.report.units import Reading, Shown, of_stroke, times
@@ -75,7 +58,7 @@ def _validation(diagnosis: Diagnosis) -> _Validation:
     return _Validation(part.recording, part.counted, diagnosis.split.floor_m, base, best)
 
 
-def report_diagnosis(diagnosis: Diagnosis, path: Path, subject: Subject, commands: Sequence[str] = ()) -> None:
+def report_diagnosis(diagnosis: Diagnosis, path: Path, subject: page.Subject, commands: Sequence[str] = ()) -> None:
     """Write the report.
 
     Args:
@@ -89,11 +72,13 @@ def report_diagnosis(diagnosis: Diagnosis, path: Path, subject: Subject, command
     """
     validation = _validation(diagnosis)
     name = subject.valve.valve.name
-    write(
+    page.write(
         path,
         f"{diagnosis.kind.noun} {name}: which effect is missing",
         [
-            heading(f"{diagnosis.kind.noun} “{name}”: which effect is missing", subject, _facts(diagnosis, validation)),
+            page.heading(
+                f"{diagnosis.kind.noun} “{name}”: which effect is missing", subject, _facts(diagnosis, validation)
+            ),
             _verdict(diagnosis, validation),
             _key_figures(diagnosis, validation),
             _fall(diagnosis, validation),
@@ -107,7 +92,7 @@ def report_diagnosis(diagnosis: Diagnosis, path: Path, subject: Subject, command
             _undetectable(diagnosis),
             _preview(diagnosis),
             recording(subject, diagnosis.split.train.record.notes, []),
-            section("words", "Words used here", glossary(DIAGNOSIS_WORDS | WORDS)),
+            page.section("words", "Words used here", page.glossary(DIAGNOSIS_WORDS | WORDS)),
         ],
     )
 
@@ -119,19 +104,19 @@ def _facts(diagnosis: Diagnosis, validation: _Validation) -> str:
     return f"fitted {fitted} samples; held out {facts(validation.base)}"
 
 
-def _verdict(diagnosis: Diagnosis, validation: _Validation) -> Html:
-    return verdict(
+def _verdict(diagnosis: Diagnosis, validation: _Validation) -> page.Html:
+    return page.verdict(
         *headline(diagnosis.verdict, diagnosis.missing, parameters_off=diagnosis.parameters_off),
-        text(diagnosis.sentence, "Where the model failed before:"),
-        bullets(validation.base.sentences),
+        page.text(diagnosis.sentence, "Where the model failed before:"),
+        page.bullets(validation.base.sentences),
     )
 
 
-def _key_figures(diagnosis: Diagnosis, validation: _Validation) -> Html:
+def _key_figures(diagnosis: Diagnosis, validation: _Validation) -> page.Html:
     before, after, read = diagnosis.base.errors, diagnosis.best.errors, Reading(diagnosis.kind)
     stroke_m = diagnosis.base.fit.valve.valve.stroke_m
     added = ", ".join(find_effect(name, "effects").name.replace("_", " ") for name in diagnosis.missing)
-    return figures_of_merit(
+    return page.figures_of_merit(
         [
             (
                 read.title("Held-out error before, rms, mm"),
@@ -149,7 +134,7 @@ def _names(diagnosis: Diagnosis) -> frozenset[str]:
     return frozenset(each.name for each in diagnosis.candidates)
 
 
-def _fall(diagnosis: Diagnosis, validation: _Validation) -> Html:
+def _fall(diagnosis: Diagnosis, validation: _Validation) -> page.Html:
     stages: list[tuple[str, EvaluatedModel, EffectCandidate | None]] = [("as it was, refitted", diagnosis.base, None)]
     stages += [
         (f"+ {step.added.name}", step.added.model, step.added)
@@ -160,7 +145,7 @@ def _fall(diagnosis: Diagnosis, validation: _Validation) -> Html:
     read = Reading(diagnosis.kind)
     figure = ranking.error_reduction(errors, validation.floor_m, read.errors)
     rows = [
-        Row(
+        page.Row(
             [
                 name,
                 read.length(model.errors.train_rmse_m),
@@ -176,18 +161,18 @@ def _fall(diagnosis: Diagnosis, validation: _Validation) -> Html:
     ]
     head = ["Model", "Error, fitted, mm", "Held out, mm", "In floors", "Median move, held out, mm", "Evidence"]
     head = [read.title(each) for each in head]
-    return section(
+    return page.section(
         "fall",
         "How the error fell",
-        plot(
+        page.plot(
             "plot-fall",
             figure,
             300,
             f"Error, rms, of each model, on a logarithmic scale. No model was fitted to the held-out data. Dashed: the "
             f"floor, {read.said(validation.floor_m)}.",
         ),
-        table("table-fall", head, rows),
-        text(
+        page.table("table-fall", head, rows),
+        page.text(
             "All errors are those of the told simulation. A move is taken with the rest that it ends in. One bad move "
             "does not change the median, and raises the rms."
         ),
@@ -202,12 +187,12 @@ def _models(validation: _Validation) -> list[Simulated]:
     return models
 
 
-def _signature(validation: _Validation) -> Html:
+def _signature(validation: _Validation) -> page.Html:
     base = validation.base
     return signature(base.command_pa, base.measured_m, _models(validation), Reading(base.own))
 
 
-def _overlay(validation: _Validation) -> Html:
+def _overlay(validation: _Validation) -> page.Html:
     base = validation.base
     whole = bool(validation.held_out.all())
     figure = overlay(
@@ -223,10 +208,10 @@ def _overlay(validation: _Validation) -> Html:
     return overlaid(figure, told, base.time_s.size)
 
 
-def _where(validation: _Validation) -> Html:
+def _where(validation: _Validation) -> page.Html:
     read = Reading(validation.base.own)
     rows = [
-        Row(
+        page.Row(
             [before.name, read.length(before.rms_m), read.length(after.rms_m), times(after.rms_m, validation.floor_m)],
             MEANINGS[before.name],
         )
@@ -239,20 +224,20 @@ def _where(validation: _Validation) -> Html:
         for when, each in (("before", validation.base), ("after", validation.best))
     ]
     head = ["What the stem does", read.title("Error before, mm"), read.title("After, mm"), "After, in floors"]
-    return section(
+    return page.section(
         "where",
         "Where it failed, and what is left",
-        table("table-phases", head, rows),
-        bullets([*slips, *(f"after: {each}" for each in validation.best.sentences)]),
+        page.table("table-phases", head, rows),
+        page.bullets([*slips, *(f"after: {each}" for each in validation.best.sentences)]),
     )
 
 
-def _ranking(diagnosis: Diagnosis, validation: _Validation) -> Html:
+def _ranking(diagnosis: Diagnosis, validation: _Validation) -> page.Html:
     steps = [RankedStep(step.before.effects, step.before.errors.test_rmse_m, ranks(step)) for step in diagnosis.steps]
     return show_tried(steps, validation.floor_m, Reading(diagnosis.kind).errors)
 
 
-def _section_of_added(diagnosis: Diagnosis) -> Html:
+def _section_of_added(diagnosis: Diagnosis) -> page.Html:
     read = Reading(diagnosis.kind)
     names = dict.fromkeys([*diagnosis.base.fit.parameters, *diagnosis.best.fit.parameters])
     rows = [
@@ -260,10 +245,10 @@ def _section_of_added(diagnosis: Diagnosis) -> Html:
         for name in names
     ]
     head = ["Parameter", "Before", "After", "95 % interval", "Unit"]
-    return show_added(diagnosis.missing, table("table-parameters", head, rows, (0,)))
+    return show_added(diagnosis.missing, page.table("table-parameters", head, rows, (0,)))
 
 
-def _parameter(name: str, before: Fitted | None, after: Fitted | None, read: Reading) -> Row:
+def _parameter(name: str, before: Fitted | None, after: Fitted | None, read: Reading) -> page.Row:
     words, factor, unit = read.parameter(name)
 
     def show_fitted(each: Fitted | None) -> Shown:
@@ -275,30 +260,30 @@ def _parameter(name: str, before: Fitted | None, after: Fitted | None, read: Rea
 
     interval = "–" if after is None else f"{factor * after.lower:.4g} to {factor * after.upper:.4g}"
     remark = "at the end of its physical range" if after and after.at_bound else ""
-    return Row([words, show_fitted(before), show_fitted(after), interval, unit], remark)
+    return page.Row([words, show_fitted(before), show_fitted(after), interval, unit], remark)
 
 
-def _next(diagnosis: Diagnosis, commands: Sequence[str]) -> Html:
+def _next(diagnosis: Diagnosis, commands: Sequence[str]) -> page.Html:
     chosen = diagnosis.experiment
-    adding = (text("To add what is missing, type:" if len(commands) == 1 else "To add one of them, type:"),)
-    acting = (*adding, keep_lines("\n".join(commands))) if commands else ()
+    adding = (page.text("To add what is missing, type:" if len(commands) == 1 else "To add one of them, type:"),)
+    acting = (*adding, page.keep_lines("\n".join(commands))) if commands else ()
     if chosen is None:
-        return section("next", "What to do next", *acting, bullets(_advice(diagnosis)))
-    return section(
+        return page.section("next", "What to do next", *acting, page.bullets(_advice(diagnosis)))
+    return page.section(
         "next",
         "What to do next",
-        text(
+        page.text(
             f"Play this command to the valve: {chosen.name}. Of a menu of commands it tells the rivals apart best: "
             f"refitted to the answer, the wrong one is left with an error of {chosen.separation:.3g} times the "
             "sensor's noise. It stays within the pressures of the recording and begins at rest.",
         ),
-        plot(
+        page.plot(
             "plot-experiment",
             _command(chosen, Reading(diagnosis.kind)),
             260,
             "The command of the experiment; --experiment FILE writes it.",
         ),
-        text("Then diagnose again with both recordings."),
+        page.text("Then diagnose again with both recordings."),
         *acting,
     )
 
@@ -354,7 +339,7 @@ def _command(chosen: Experiment, read: Reading) -> dict[str, object]:
     }
 
 
-def _undetectable(diagnosis: Diagnosis) -> Html:
+def _undetectable(diagnosis: Diagnosis) -> page.Html:
     best, read = diagnosis.best.fit, Reading(diagnosis.kind)
     said = [each.sentence(lambda name: read.parameter(name)[0]) for each in best.undetermined]
     said += [
@@ -367,17 +352,17 @@ def _undetectable(diagnosis: Diagnosis) -> Html:
         said.append("searches from independent starts end at different parameters: a better fit may exist")
     said.append("pressure and position show ratios of forces only: the diaphragm area is that of the valve file")
     said.append("an effect that does not show under this recording's inputs may still be there")
-    return section("undetectable", "What the recording cannot show", bullets(said))
+    return page.section("undetectable", "What the recording cannot show", page.bullets(said))
 
 
-def _preview(diagnosis: Diagnosis) -> Html:
-    rows = [Row([each.name, f"{100 * each.score:.3g} %"]) for each in diagnosis.preview]
-    return fold_parts(
+def _preview(diagnosis: Diagnosis) -> page.Html:
+    rows = [page.Row([each.name, f"{100 * each.score:.3g} %"]) for each in diagnosis.preview]
+    return page.fold_parts(
         "preview",
         "For specialists: the first guess, before any effect was fitted",
-        text(
+        page.text(
             "Share of the error that a weak effect of each kind would explain. It names the right effect in some two "
             "of three cases."
         ),
-        table("table-preview", ["Effect", "Share"], rows),
+        page.table("table-preview", ["Effect", "Share"], rows),
     )

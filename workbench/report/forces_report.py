@@ -10,27 +10,11 @@ from workbench.compare.residuals import BINS, FEWEST_BIN_ROWS, Profile, profile
 from workbench.data.imposed_motion import Rows
 from workbench.forces.force_balance import ForceFit, balanced_n, carried_n
 from workbench.forces.force_diagnosis import BALANCE_FLOORS, ForceDiagnosis
-from workbench.report import ranking
+from workbench.report import page, ranking
 from workbench.report.charts import EXTENDED, MEASURED, MODEL, QUIET, Figure, axis, layout, line, profiles
 from workbench.report.comparison_report import WORDS
 from workbench.report.diagnosis_report import DIAGNOSIS_WORDS
 from workbench.report.effects_table import RankedStep, headline, not_told_apart, ranks, show_added, show_tried
-from workbench.report.page import (
-    Html,
-    Row,
-    Subject,
-    bullets,
-    figures_of_merit,
-    glossary,
-    heading,
-    pair,
-    plot,
-    section,
-    table,
-    text,
-    verdict,
-    write,
-)
 from workbench.report.plot_series import round_values
 from workbench.report.units import FORCE, Shown, force, parameter, times
 
@@ -53,7 +37,7 @@ FORCE_WORDS = {
 }
 
 
-def report_forces(diagnosis: ForceDiagnosis, path: Path, subject: Subject) -> None:
+def report_forces(diagnosis: ForceDiagnosis, path: Path, subject: page.Subject) -> None:
     """Write the report.
 
     Args:
@@ -65,12 +49,12 @@ def report_forces(diagnosis: ForceDiagnosis, path: Path, subject: Subject) -> No
         InputError: plotly is not installed, or the file cannot be written.
     """
     title = f"Valve “{subject.valve.valve.name}”: what the balance of forces lacks"
-    write(
+    page.write(
         path,
         title,
         [
-            heading(title, subject, _facts(diagnosis.rows)),
-            verdict(*headline(diagnosis.verdict, diagnosis.missing), text(diagnosis.sentence)),
+            page.heading(title, subject, _facts(diagnosis.rows)),
+            page.verdict(*headline(diagnosis.verdict, diagnosis.missing), page.text(diagnosis.sentence)),
             _key_figures(diagnosis),
             _fall(diagnosis),
             _friction(diagnosis, balanced_n(diagnosis.rows, subject.valve.valve)),
@@ -78,8 +62,8 @@ def report_forces(diagnosis: ForceDiagnosis, path: Path, subject: Subject) -> No
             _ranking(diagnosis),
             show_added(diagnosis.missing, _parameters(diagnosis)),
             not_told_apart(diagnosis.indistinguishable, _names(diagnosis), diagnosis.missing, "nothing in such rows"),
-            section("recording", "About the recordings", bullets(diagnosis.rows.notes or (ALL_TAKEN,))),
-            section("words", "Words used here", glossary(FORCE_WORDS)),
+            page.section("recording", "About the recordings", page.bullets(diagnosis.rows.notes or (ALL_TAKEN,))),
+            page.section("words", "Words used here", page.glossary(FORCE_WORDS)),
         ],
     )
 
@@ -94,14 +78,14 @@ def _facts(rows: Rows) -> str:
     return f"{len(rows)} rows, {recordings} recording{'s' if recordings > 1 else ''}, {strokes} strokes"
 
 
-def _key_figures(diagnosis: ForceDiagnosis) -> Html:
+def _key_figures(diagnosis: ForceDiagnosis) -> page.Html:
     floor_n, best = diagnosis.floor_n, diagnosis.best
     typical = (
         Shown("–") if floor_n is None else Shown(times(best.median_error_n, floor_n)),
         f"of {floor_n:.3g} N; explained: at most {BALANCE_FLOORS:g} ×" if floor_n else "each place is passed once",
     )
     added = ", ".join(name.replace("_", " ") for name in diagnosis.missing)
-    return figures_of_merit(
+    return page.figures_of_merit(
         [
             ("Held-out error before, rms, N", force(diagnosis.base.test_rms_n), "the bare balance, refitted"),
             ("and after, N", force(best.test_rms_n), ""),
@@ -115,11 +99,11 @@ def _names(diagnosis: ForceDiagnosis) -> frozenset[str]:
     return frozenset(each.name for each in diagnosis.candidates)
 
 
-def _fall(diagnosis: ForceDiagnosis) -> Html:
+def _fall(diagnosis: ForceDiagnosis) -> page.Html:
     stages = [("bare", diagnosis.base), *((f"+ {s.added.name}", s.added.fit) for s in diagnosis.steps if s.added)]
     errors = [(name, fit.train_rms_n, fit.test_rms_n) for name, fit in stages]
     rows = [
-        Row(
+        page.Row(
             [
                 name,
                 force(fit.train_rms_n),
@@ -130,20 +114,22 @@ def _fall(diagnosis: ForceDiagnosis) -> Html:
         )
         for name, fit in stages
     ]
-    return section(
+    return page.section(
         "fall",
         "How the error fell",
-        plot(
+        page.plot(
             "plot-fall",
             ranking.error_reduction(errors, None, FORCE),
             300,
             "Error of the balance, rms. Each held-out part is predicted by a fit that has not seen it.",
         ),
-        table("table-fall", ["Balance", "Error, fitted, N", "Held out, N", "Median, held out, N", "Evidence"], rows),
+        page.table(
+            "table-fall", ["Balance", "Error, fitted, N", "Held out, N", "Median, held out, N", "Evidence"], rows
+        ),
     )
 
 
-def _friction(diagnosis: ForceDiagnosis, measured_n: Column) -> Html:
+def _friction(diagnosis: ForceDiagnosis, measured_n: Column) -> page.Html:
     rows, best = diagnosis.rows, diagnosis.best
     every = -(-len(rows) // DRAWN_ROWS)
     left_n = (measured_n - carried_n(rows, best.parameters))[::every]
@@ -159,10 +145,10 @@ def _friction(diagnosis: ForceDiagnosis, measured_n: Column) -> Html:
     }
     figure["layout"]["legend"] |= {"itemsizing": "constant"}
     thinned = f" Every {every}th row is drawn; the figures are of all {len(rows)}." if every > 1 else ""
-    return section(
+    return page.section(
         "friction",
         "Friction: what spring and pressure leave",
-        plot(
+        page.plot(
             "plot-friction",
             figure,
             420,
@@ -179,7 +165,7 @@ def _dot(colour: str, drawn: Sequence[float | None]) -> Figure:
     return {"color": colour, "size": 4 if len(drawn) > LARGE_DOT_ROWS else 9, "opacity": 0.6}
 
 
-def _where(diagnosis: ForceDiagnosis) -> Html:
+def _where(diagnosis: ForceDiagnosis) -> page.Html:
     rows = diagnosis.rows
     opening = rows.direction > 0.0
     places = [
@@ -194,14 +180,16 @@ def _where(diagnosis: ForceDiagnosis) -> Html:
     fits = [("before", MODEL, diagnosis.base)]
     if diagnosis.missing:
         fits.append(("after", EXTENDED, diagnosis.best))
-    return section(
+    return page.section(
         "where",
         "Where it failed, and what is left",
-        text(
+        page.text(
             "The error, counted against the motion: positive where the stem resists more than the balance says. "
             "Means with ± 1 standard error; of a static curve each reading."
         ),
-        pair(*(_profile(name, title, over, factor, kept, rows, fits) for name, title, over, factor, kept in places)),
+        page.pair(
+            *(_profile(name, title, over, factor, kept, rows, fits) for name, title, over, factor, kept in places)
+        ),
     )
 
 
@@ -213,12 +201,12 @@ def _profile(
     kept: np.ndarray[tuple[int], np.dtype[np.bool_]],
     rows: Rows,
     fits: list[tuple[str, str, ForceFit]],
-) -> Html:
+) -> page.Html:
     resisting = [
         (said, colour, _means(over[kept], (rows.direction * fit.residual_n)[kept])) for said, colour, fit in fits
     ]
     figure = profiles(resisting, (title, factor), ("resistance left, N", 1.0, "N", "N"))
-    return plot(f"plot-over-{name}", figure, 280, f"Mean error {title}.")
+    return page.plot(f"plot-over-{name}", figure, 280, f"Mean error {title}.")
 
 
 def _means(over: Column, values: Column) -> Profile:
@@ -229,18 +217,18 @@ def _means(over: Column, values: Column) -> Profile:
     return Profile(over[order], values[order], np.zeros(over.size), np.ones(over.size, np.int64))
 
 
-def _ranking(diagnosis: ForceDiagnosis) -> Html:
+def _ranking(diagnosis: ForceDiagnosis) -> page.Html:
     steps = [RankedStep(step.before.effects, step.before.test_rms_n, ranks(step)) for step in diagnosis.steps]
     return show_tried(steps, None, FORCE)
 
 
-def _parameters(diagnosis: ForceDiagnosis) -> Html:
+def _parameters(diagnosis: ForceDiagnosis) -> page.Html:
     base, best = diagnosis.base, diagnosis.best
     rows = [_parameter(name, base, best) for name in dict.fromkeys([*base.parameters, *best.parameters])]
-    return table("table-parameters", ["Parameter", "Before", "After", "Std", "Unit"], rows, (0,))
+    return page.table("table-parameters", ["Parameter", "Before", "After", "Std", "Unit"], rows, (0,))
 
 
-def _parameter(name: str, base: ForceFit, best: ForceFit) -> Row:
+def _parameter(name: str, base: ForceFit, best: ForceFit) -> page.Row:
     words, factor, unit = parameter(name)
 
     def show(value: float | None) -> Shown:
@@ -248,6 +236,6 @@ def _parameter(name: str, base: ForceFit, best: ForceFit) -> Row:
 
     std = best.deviations.get(name)
     spread = "–" if std is None else f"{factor * std:.2g}"
-    return Row(
+    return page.Row(
         [BALANCE.get(name, words), show(base.parameters.get(name)), show(best.parameters.get(name)), spread, unit]
     )

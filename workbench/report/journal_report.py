@@ -5,21 +5,7 @@ from pathlib import Path
 
 from config.drive import Kind
 from workbench.diagnosis.extension_journal import ExtensionStep, Journal
-from workbench.report import ranking
-from workbench.report.page import (
-    Html,
-    Row,
-    bullets,
-    glossary,
-    heading_alone,
-    plot,
-    section,
-    subheading,
-    table,
-    text,
-    verdict,
-    write,
-)
+from workbench.report import page, ranking
 from workbench.report.units import Reading, Shown, times
 
 WORDS = {
@@ -50,36 +36,36 @@ def report_journal(journal: Journal, path: Path, name: str, kind: Kind) -> None:
         f"{times(last.extended_test_rmse_m, last.floor_m)} the floor"
     )
     better = last.extended_test_rmse_m < last.before_test_rmse_m
-    write(
+    page.write(
         path,
         f"{kind.noun} {name}: how its model grew",
         [
-            heading_alone(what, f"{len(journal.steps)} step{'s' if len(journal.steps) > 1 else ''}"),
-            verdict(
+            page.heading_alone(what, f"{len(journal.steps)} step{'s' if len(journal.steps) > 1 else ''}"),
+            page.verdict(
                 "good" if better else "bad",
                 f"{fell}.",
-                bullets([_remark(*each, read) for each in enumerate(journal.steps, start=1)]),
+                page.bullets([_remark(*each, read) for each in enumerate(journal.steps, start=1)]),
             ),
             *journal_sections(journal.steps, read),
-            section("words", "Words used here", glossary(WORDS)),
+            page.section("words", "Words used here", page.glossary(WORDS)),
         ],
     )
 
 
-def journal_sections(steps: Sequence[ExtensionStep], read: Reading) -> tuple[Html, ...]:
+def journal_sections(steps: Sequence[ExtensionStep], read: Reading) -> tuple[page.Html, ...]:
     """Return the sections of how the error fell, and of what was done in each step."""
     floor_m, stages = steps[-1].floor_m, _stages(steps)
     return (
-        section(
+        page.section(
             "fall",
             "How the error fell",
-            plot(
+            page.plot(
                 "plot-journal",
                 ranking.error_reduction(stages, floor_m, read.errors),
                 320,
                 f"Error, rms, at each step. Dashed: the floor of the last, {read.said(floor_m)}.",
             ),
-            table(
+            page.table(
                 "table-journal",
                 [read.title(each) for each in HEAD],
                 [_row(*each, floor_m, read) for each in stages],
@@ -113,19 +99,19 @@ def _remark(number: int, step: ExtensionStep, read: Reading) -> str:
     )
 
 
-def _row(name: str, train_m: float, test_m: float, floor_m: float | None, read: Reading) -> Row:
-    return Row([name, read.length(train_m), read.length(test_m), times(test_m, floor_m)])
+def _row(name: str, train_m: float, test_m: float, floor_m: float | None, read: Reading) -> page.Row:
+    return page.Row([name, read.length(train_m), read.length(test_m), times(test_m, floor_m)])
 
 
-def _step(number: int, step: ExtensionStep, read: Reading) -> Html:
+def _step(number: int, step: ExtensionStep, read: Reading) -> page.Html:
     rows = []
     for name, value in step.parameters.items():
         words, factor, unit = read.parameter(name)
-        rows.append(Row([words, Shown(f"{factor * value:.4g}", f"{read.kind.text(name)} = {value:.6g}"), unit]))
-    return section(
+        rows.append(page.Row([words, Shown(f"{factor * value:.4g}", f"{read.kind.text(name)} = {value:.6g}"), unit]))
+    return page.section(
         f"step-{number}",
         f"Step {number}: {step.words}",
-        text(f"Why: {step.why}."),
-        subheading("What was fitted"),
-        table(f"table-step-{number}", ["Parameter", "Value", "Unit"], rows),
+        page.text(f"Why: {step.why}."),
+        page.subheading("What was fitted"),
+        page.table(f"table-step-{number}", ["Parameter", "Value", "Unit"], rows),
     )
