@@ -3,9 +3,9 @@
 `SIMULATED_MAP` is where the simulated slave keeps them; the map of a real device is written in the same words.
 """
 
-from collections.abc import Iterable
+from collections.abc import Iterator, Mapping
 from itertools import pairwise, product
-from typing import Annotated, Any, Literal, Self, get_args
+from typing import Annotated, Any, Literal, Protocol, Self, TypeVar, get_args
 
 from pydantic import Field, model_validator
 
@@ -18,6 +18,19 @@ MOST_REGISTERS = 125
 """A Modbus reply carries at most this many registers."""
 
 
+class Laid(Protocol):
+    """What lies in registers, from an address up to an end."""
+
+    @property
+    def address(self) -> int:
+        """The first register."""
+
+    @property
+    def end(self) -> int:
+        """The address just past the last."""
+
+
+LaidT = TypeVar("LaidT", bound=Laid)
 ORDERS: tuple[Order, ...] = get_args(Order)
 
 
@@ -156,7 +169,7 @@ class ModbusMap(QuantityMap[Place]):
     def runs(self) -> list[Run]:
         """The reads that bring one sample: as few as there can be."""
         tables = ({n: each for n, each in self.sampled.items() if each.table == t} for t in ("holding", "input"))
-        return [run for table in tables for run in _within(table, MOST_REGISTERS)]
+        return [run for table in tables for run in runs_within(table, MOST_REGISTERS)]
 
     def device_status(self, raw: int) -> int:
         """Return the bits of `DeviceStatus` that a status word says."""
@@ -193,7 +206,7 @@ class ModbusMap(QuantityMap[Place]):
 
 def without_holes(run: Run) -> list[Run]:
     """Return a run cut wherever a register lies between its quantities, for a device that refuses to read such."""
-    return list(_within(run, 0))
+    return list(runs_within(run, 0))
 
 
 def words_of(run: Run) -> int:
@@ -201,16 +214,25 @@ def words_of(run: Run) -> int:
     return max(each.end for each in run.values()) - min(each.address for each in run.values())
 
 
-def _within(places: Run, most: int) -> Iterable[Run]:
-    """Yield the places by address, in runs of at most so many registers, or without a hole."""
-    run: Run = {}
+def runs_within(places: Mapping[str, LaidT], most: int) -> Iterator[dict[str, LaidT]]:
+    """Yield what lies in registers by address, in runs of at most so many registers; of 0, in runs without a hole.
+
+    >>> places = {name: Place(address=address) for name, address in {"a": 0, "b": 2, "c": 9}.items()}
+    >>> [list(run) for run in runs_within(places, 0)], [list(run) for run in runs_within(places, 11)]
+    ([['a', 'b'], ['c']], [['a', 'b', 'c']])
+    """
+    run: dict[str, LaidT] = {}
+    start = end = held = 0
     for name, place in sorted(places.items(), key=lambda each: each[1].address):
-        longer = {**run, name: place}
-        beyond = words_of(longer) > max(most, sum(each.format.words for each in longer.values()))
-        if run and beyond:
+        size = place.end - place.address
+        if run and max(end, place.end) - start > max(most, held + size):
             yield run
-            longer = {name: place}
-        run = longer
+            run = {}
+        if not run:
+            start = end = place.address
+            held = 0
+        run[name] = place
+        end, held = max(end, place.end), held + size
     if run:
         yield run
 

@@ -12,7 +12,7 @@ from pymodbus.constants import ExcCodes
 
 from config.codes import ExperimentState, Fault, InhibitReason, Refusal, State
 from config.errors import CommandFailed, InputError
-from config.modbus_map import MOST_REGISTERS
+from config.modbus_map import MOST_REGISTERS, runs_within
 from config.registers import Register, register_named
 from config.tls_table import Tls
 from fieldbus.modbus.client import ModbusClient
@@ -84,14 +84,11 @@ class Dcs:
 
     def get_all(self, *names: str) -> dict[str, float]:
         """Return several values, those within one reply's reach from the same snapshot."""
-        registers = sorted((register_named(name) for name in names), key=lambda each: each.address)
         values: dict[str, float] = {}
-        while registers:
-            start = registers[0].address
-            near = [each for each in registers if each.end <= start + MOST_REGISTERS]
-            words = self._read(start, near[-1].end)
-            values |= {each.name: self._decoded(each, words, start) for each in near}
-            registers = registers[len(near) :]
+        for run in runs_within({name: register_named(name) for name in names}, MOST_REGISTERS):
+            start, *_ = (each.address for each in run.values())
+            words = self._read(start, max(each.end for each in run.values()))
+            values |= {name: self._decoded(each, words, start) for name, each in run.items()}
         return {name: values[name] for name in names}
 
     def set(self, name: str, value: float) -> None:
@@ -109,18 +106,17 @@ class Dcs:
         Raises:
             InputError, DcsError: as `set`.
         """
-        registers = sorted((register_named(name) for name in values), key=lambda each: each.address)
-        for register in registers:
-            if problem := register.problem_with(values[register.name]):
-                raise InputError(register.name, problem.removeprefix(f"{register.name}: "))
-        while registers:
-            run = _neighbours(registers)
-            registers = registers[len(run) :]
-            words = [word for each in run for word in each.format.encode(values[each.name])]
+        registers = {name: register_named(name) for name in values}
+        for name, register in registers.items():
+            if problem := register.problem_with(values[name]):
+                raise InputError(name, problem.removeprefix(f"{name}: "))
+        for run in runs_within(registers, 0):
+            start, *_ = (each.address for each in run.values())
+            words = [word for name, each in run.items() for word in each.format.encode(values[name])]
             try:
-                self._client.write_registers(run[0].address, words)
+                self._client.write_registers(start, words)
             except ClientError as error:
-                asked = ", ".join(f"{each.name} = {values[each.name]:g}" for each in run)
+                asked = ", ".join(f"{name} = {values[name]:g}" for name in run)
                 why = self._why_refused(values, error) or _in_words(error)
                 raise DcsError(f"{self._where}: {asked} was refused: {why}") from None
 
@@ -284,16 +280,6 @@ class Dcs:
     @staticmethod
     def _decoded(register: Register, words: list[int], start: int) -> float:
         return register.format.decode(words[register.address - start : register.end - start])
-
-
-def _neighbours(registers: Sequence[Register]) -> list[Register]:
-    """Return the first of them and those that follow it without a gap."""
-    run = [registers[0]]
-    for register in registers[1:]:
-        if register.address != run[-1].end:
-            break
-        run.append(register)
-    return run
 
 
 def _plain(code: Fault | InhibitReason) -> str:

@@ -20,8 +20,8 @@ if TYPE_CHECKING:
 MEASURED, MODEL, BETTER, QUIET, FAINT = "#1f2a37", "#d9622b", "#1b7f79", "#5b6675", "#9aa4b1"
 """Colours: what was measured, a model, what is valid or chosen, what stands beside it, what was refused."""
 WIDTH_INCHES, ROW_INCHES = 10.0, 0.26  # of a picture, and of a bar in it with its words
-TICKS = (1.0, 2.0, 5.0)
-"""Of a decade."""
+STEPS = ((1, 2, 5), (1, 1.5, 2, 3, 4, 5, 6, 7, 8, 9), (1, 1.2, 1.4, 1.6, 1.8, 2, 2.5, 3, 3.5, 4, 4.5, 5, 6, 7, 8, 9))
+"""Where a decade has ticks, coarse to fine."""
 
 
 def panels(heights: Sequence[float]) -> "tuple[Figure, Sequence[Axes]]":
@@ -100,17 +100,31 @@ def race(errors: Mapping[str, float], chosen: Collection[str], marks: Mapping[st
 
 def _logarithmic(axes: "Axes", values: Sequence[float]) -> None:
     """Scale the horizontal axis to the values, with ticks in plain numbers."""
-    positive = [each for each in values if each > 0.0]
+    if span := decade_ticks(values):
+        low, high, shown = span
+        axes.set_xscale("log")
+        axes.set_xlim(low, high)
+        axes.set_xticks(shown, [f"{each:g}" for each in shown])
+        axes.minorticks_off()
+
+
+def decade_ticks(values: Sequence[float]) -> tuple[float, float, list[float]] | None:
+    """Return the ends of a logarithmic axis about values, and its ticks: at 1, 2 and 5, or finer to be three at least.
+
+    None: no value is positive and finite.
+    """
+    positive = [each for each in values if 0.0 < each < np.inf]
     if not positive:
-        return
+        return None
     low, high = 0.8 * min(positive), 1.25 * max(positive)
     decades = range(int(np.floor(np.log10(low))), int(np.ceil(np.log10(high))) + 1)
-    ticks = [step * 10.0**decade for decade in decades for step in TICKS]
-    shown = [each for each in ticks if low <= each <= high] or [min(positive)]
-    axes.set_xscale("log")
-    axes.set_xlim(low, high)
-    axes.set_xticks(shown, [f"{each:.3g}" for each in shown])
-    axes.minorticks_off()
+    shown: list[float] = []
+    for steps in STEPS:
+        ticks = [step * 10.0**decade for decade in decades for step in steps]
+        shown = [float(f"{each:.3g}") for each in ticks if low <= each <= high]
+        if len(shown) > 2:
+            break
+    return low, high, shown
 
 
 def line(axes: "Axes", x: ArrayLike, y: ArrayLike, colour: str, label: str = "", **style: Any) -> None:

@@ -23,14 +23,11 @@ from config.canopen_device import CanopenDevice
 from config.quantities import DeviceStatus
 from drivers.boundary import Capabilities, Driver, DriverError, Reading, Refused
 from drivers.canopen.activation import Activation
-from drivers.canopen.configuration import NodeConfiguration
 from drivers.canopen.events import NodeEvent
-from drivers.canopen.node_bus import EMERGENCY, HEARTBEAT, NMT, SDO_ANSWER, NodeBus
-from drivers.canopen.only_watch import WatchingDriver
-from drivers.canopen.pdo import PdoExchange
-from drivers.canopen.readings import capabilities_of, reading_of
-from drivers.canopen.sdo import ILLEGAL_VALUE, SdoTransfers, Setting, device_sheet
-from drivers.canopen.watcher import NodeWatcher
+from drivers.canopen.node_bus import EMERGENCY, HEARTBEAT, NMT, SDO_ANSWER
+from drivers.canopen.only_watch import NodeDriver, WatchingDriver
+from drivers.canopen.readings import reading_of
+from drivers.canopen.sdo import ILLEGAL_VALUE, Setting
 from fieldbus.canopen.objects import HOLDING, LOCAL, STATE_BITS, NodeState, inactive_because
 
 START, ENTER_PRE_OPERATIONAL = 1, 128  # NMT commands of CiA 301
@@ -46,24 +43,11 @@ def canopen_driver(config: CanopenDevice) -> Driver:
     return WatchingDriver(config) if config.only_watch else CanopenDriver(config)
 
 
-class CanopenDriver:
-    """Drives a node.
-
-    Args:
-        config: bus, node id, data sheet, time-outs, where its quantities are.
-
-    Raises:
-        InputError: the data sheet cannot be read, or has not what the map names.
-    """
+class CanopenDriver(NodeDriver):
+    """Drives a node."""
 
     def __init__(self, config: CanopenDevice) -> None:
-        sheet = device_sheet(config)
-        self._config = config
-        self._bus = NodeBus(config)
-        self._watcher = NodeWatcher(config, self._bus)
-        self.sdo = SdoTransfers(config, sheet, self._bus, self._watcher)
-        self.pdos = PdoExchange(config, sheet, self._bus, self._watcher)
-        self._configuration = NodeConfiguration(config, sheet, self._bus, self._watcher, self.sdo, self.pdos)
+        super().__init__(config)
         self._activation = Activation(config.map, self._bus)
         self._said_alive_s = -math.inf
         self._has_driven = False
@@ -71,7 +55,7 @@ class CanopenDriver:
     @property
     def capabilities(self) -> Capabilities:
         """What the device can do."""
-        capabilities = capabilities_of(self._config)
+        capabilities = super().capabilities
         return replace(capabilities, sample_counter=capabilities.sample_counter or self.pdos.come_by_themselves)
 
     def open(self) -> float:

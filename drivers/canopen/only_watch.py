@@ -1,4 +1,7 @@
-"""Reads a node that another drives, or nobody: by SDO alone (no NMT, no SYNC, nothing set)."""
+"""What the drivers of a node are made of, and the one that only watches: it reads by SDO alone, and sets nothing.
+
+No NMT, no SYNC: another drives the node, or nobody.
+"""
 
 from config.canopen_device import CanopenDevice
 from drivers.boundary import Capabilities, Reading, Refused
@@ -11,8 +14,8 @@ from drivers.canopen.sdo import ILLEGAL_VALUE, SdoTransfers, device_sheet
 from drivers.canopen.watcher import NodeWatcher
 
 
-class WatchingDriver:
-    """A driver that commands nothing. The values of one reading may be of several samples.
+class NodeDriver:
+    """What the drivers of a node are made of.
 
     Args:
         config: bus, node id, data sheet, time-outs, where its quantities are.
@@ -26,14 +29,18 @@ class WatchingDriver:
         self._config = config
         self._bus = NodeBus(config)
         self._watcher = NodeWatcher(config, self._bus)
-        self._sdo = SdoTransfers(config, sheet, self._bus, self._watcher)
-        pdos = PdoExchange(config, sheet, self._bus, self._watcher)
-        self._configuration = NodeConfiguration(config, sheet, self._bus, self._watcher, self._sdo, pdos)
+        self.sdo = SdoTransfers(config, sheet, self._bus, self._watcher)
+        self.pdos = PdoExchange(config, sheet, self._bus, self._watcher)
+        self._configuration = NodeConfiguration(config, sheet, self._bus, self._watcher, self.sdo, self.pdos)
 
     @property
     def capabilities(self) -> Capabilities:
         """What the device can do."""
         return capabilities_of(self._config)
+
+
+class WatchingDriver(NodeDriver):
+    """A driver that commands nothing. The values of one reading may be of several samples."""
 
     def open(self) -> float:
         """Return the command the node holds, in Pa.
@@ -44,8 +51,8 @@ class WatchingDriver:
         self.close()
         try:
             self._bus.open((SDO_ANSWER + self._config.node,))
-            self._sdo.open()
-            return self._sdo.held_command_pa(self._config.map.command_pa)
+            self.sdo.open()
+            return self.sdo.held_command_pa(self._config.map.command_pa)
         except BaseException:
             self.close()
             raise
@@ -57,7 +64,7 @@ class WatchingDriver:
             DriverError: an object could not be read.
         """
         sampled = self._config.map.sampled
-        return reading_of({name: self._sdo.get(entry) for name, entry in sampled.items()})
+        return reading_of({name: self.sdo.get(entry) for name, entry in sampled.items()})
 
     def write(self, command_pa: float) -> None:
         """Command nothing.

@@ -9,7 +9,7 @@ import json
 from collections.abc import Sequence
 from typing import TYPE_CHECKING, Any
 
-from config.modbus_map import MOST_REGISTERS
+from config.modbus_map import MOST_REGISTERS, runs_within
 from config.registers import REGISTERS, Register
 
 if TYPE_CHECKING:
@@ -99,11 +99,6 @@ def _row(row: int, file: "DaemonFile", registers: Sequence[Register]) -> list[di
 
 def _blocks(registers: Sequence[Register]) -> list[tuple[int, int]]:
     """Return the requests that read all registers: first address and number of each."""
-    left = sorted(registers, key=lambda each: each.address)
-    blocks = []
-    while left:
-        start = left[0].address
-        near = [each for each in left if each.end <= start + MOST_REGISTERS]
-        blocks.append((start, near[-1].end - start))
-        left = left[len(near) :]
-    return blocks
+    runs = runs_within({each.name: each for each in registers}, MOST_REGISTERS)
+    ends = [(min(each.address for each in run.values()), max(each.end for each in run.values())) for run in runs]
+    return [(start, end - start) for start, end in ends]

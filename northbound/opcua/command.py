@@ -1,6 +1,7 @@
 """`positioner opcua`: running valves for OPC UA clients."""
 
 import argparse
+import asyncio
 from pathlib import Path
 
 from config.errors import InputError
@@ -67,5 +68,6 @@ def run(arguments: argparse.Namespace) -> int:
         print(f"serving {names} on opc.tcp://{arguments.listen_host}:{port}", flush=True)
 
     with watching(places) as valves:
-        serve_opcua(valves, Listening(arguments.listen_host, arguments.listen_port), keys, sign_in, ready)
+        where = Listening(arguments.listen_host, arguments.listen_port)
+        asyncio.run(serve_opcua(valves, where, keys, sign_in, ready))
     return 0

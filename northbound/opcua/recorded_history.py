@@ -6,7 +6,7 @@ Of the file nothing is copied and nothing is kept here; it is opened, read and c
 import asyncio
 import math
 from collections.abc import Iterator, Mapping
-from dataclasses import dataclass
+from dataclasses import dataclass, fields
 from datetime import UTC, datetime
 from pathlib import Path
 from typing import Any, TypeVar
@@ -19,7 +19,7 @@ from asyncua.server.history import HistoryStorageInterface
 from config.codes import Ne107Status
 from config.errors import InputError
 from northbound.opcua.device_health import SEVERITY, device_health
-from northbound.opcua.valve_nodes import HEALTH
+from northbound.opcua.valve_nodes import ESTIMATES, HEALTH
 from positioner.history import HistoryReader
 from positioner.history.entries import Event, HealthHour, Identification
 
@@ -43,13 +43,7 @@ BY_HOUR = {
 """Columns of the hours by the nodes whose history they are, at the time when the hour began."""
 
 BY_IDENTIFICATION = {
-    "Estimates.A": "a",
-    "Estimates.B": "b",
-    "Estimates.C": "c",
-    "Estimates.K": "k",
-    "Estimates.BOverC": "b_over_c",
-    "Estimates.KOverC": "k_over_c",
-    "Estimates.Breakaway": "breakaway",
+    f"Estimates.{ESTIMATES[each.name]}": each.name for each in fields(Identification) if each.name in ESTIMATES
 }
 """The same of the identifications."""
 

@@ -24,41 +24,35 @@ PRESSURE_SIGNAL = f"{PRESSURE}.AnalogSignal"
 HEALTH = "DeviceHealth"
 IDENTIFICATION = "Identification"
 
+
+def name_of(register: str) -> str:
+    """Return what the node of a register is called.
+
+    >>> name_of("reference_in_force")
+    'ReferenceInForce'
+    """
+    return "".join(part.capitalize() for part in register.split("_"))
+
+
+def _nodes_of(*registers: str) -> dict[str, str]:
+    return {name_of(each): each for each in registers}
+
+
 NUMBERS = {
-    "Control": {
-        "ReferenceInForce": "reference_in_force",
-        "Command": "command",
-        "SampleAge": "sample_age",
-        "CyclePeriod": "period",
-        "MissedPeriods": "missed_periods",
-        "LostSamples": "lost_samples",
-        "LostReplies": "lost_replies",
-        "IdentificationProgress": "progress",
-    },
-    "Wear": {
-        "Friction": "friction",
-        "FrictionBaseline": "friction_baseline",
-        "FrictionRatio": "friction_ratio",
-        "Travel": "travel",
-        "Reversals": "reversals",
-        "StictionIndex": "stiction_index",
-        "MovesJudged": "moves_judged",
-    },
+    "Control": _nodes_of(
+        "reference_in_force", "command", "sample_age", "missed_periods", "lost_samples", "lost_replies"
+    )
+    | {"CyclePeriod": "period", "IdentificationProgress": "progress"},
+    "Wear": _nodes_of(
+        "friction", "friction_baseline", "friction_ratio", "travel", "reversals", "stiction_index", "moves_judged"
+    ),
 }
 """By folder: a node's name and its register; SI units, shares of the stroke as p.u."""
 
-STATES = {
-    "Mode": "mode",
-    "State": "state",
-    "Service": "service",
-    "Fault": "fault",
-    "Quality": "quality",
-    "HealthCause": "ne107_cause",
-    "Inhibit": "why",
-}
+STATES = _nodes_of("mode", "state", "service", "fault", "quality") | {"HealthCause": "ne107_cause", "Inhibit": "why"}
 """In folder `Status`: a node's name and the register of its code."""
 
-ESTIMATES = {name: "".join(part.capitalize() for part in name.split("_")) for name in IDENTIFIED}
+ESTIMATES = {name: name_of(name) for name in IDENTIFIED}
 """In folder `Estimates`: a node's name by the estimate's; each has its deviation and why it is refused beside it."""
 
 

@@ -58,7 +58,7 @@ class Listening:
     port: int
 
 
-def serve_opcua(
+async def serve_opcua(
     valves: Sequence[WatchedValve],
     where: Listening,
     keys: ApplicationKeys,
@@ -77,16 +77,6 @@ def serve_opcua(
     Raises:
         InputError: it cannot listen there.
     """
-    asyncio.run(_serve(valves, where, keys, sign_in, ready))
-
-
-async def _serve(
-    valves: Sequence[WatchedValve],
-    where: Listening,
-    keys: ApplicationKeys,
-    sign_in: SignIn,
-    ready: Callable[[int], None],
-) -> None:
     stop = asyncio.Event()
     with suppress(NotImplementedError):  # on Windows a process is ended without being asked
         asyncio.get_running_loop().add_signal_handler(signal.SIGTERM, stop.set)

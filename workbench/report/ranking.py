@@ -5,6 +5,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
+from config.results.drawing import decade_ticks
 from workbench.report.charts import EXTENDED, INK, MEASURED, OPEN, QUIET, Figure, axis, layout, mark_line
 from workbench.report.plot_series import significant
 from workbench.report.units import Quantity
@@ -17,8 +18,6 @@ OUTCOMES = {
     "refused": ("#9aa4b1", "x-thin-open"),
 }
 ORDER = list(OUTCOMES)
-STEPS = ((1, 2, 5), (1, 1.5, 2, 3, 4, 5, 6, 7, 8, 9), (1, 1.2, 1.4, 1.6, 1.8, 2, 2.5, 3, 3.5, 4, 4.5, 5, 6, 7, 8, 9))
-"""Where a decade has ticks, coarse to fine."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -79,18 +78,10 @@ def _errors(tried: Sequence[RankedEffect]) -> list[float]:
 
 
 def log_ticks(values: Sequence[float]) -> Figure:
-    """Return ticks at 1, 2 and 5 of the decades that the values span; more where that would be fewer than three."""
-    positive = [each for each in values if 0.0 < each < np.inf]
-    if not positive:
+    """Return ends and ticks of a logarithmic axis about values."""
+    if (span := decade_ticks(values)) is None:
         return {}
-    low, high = 0.8 * min(positive), 1.25 * max(positive)
-    decades = range(int(np.floor(np.log10(low))), int(np.ceil(np.log10(high))) + 1)
-    shown: list[float] = []
-    for steps in STEPS:
-        ticks = [step * 10.0**decade for decade in decades for step in steps]
-        shown = [float(f"{each:.3g}") for each in ticks if low <= each <= high]
-        if len(shown) > 2:
-            break
+    low, high, shown = span
     return {"tickvals": shown, "ticktext": [f"{each:g}" for each in shown], "range": np.log10([low, high]).tolist()}
 
 
