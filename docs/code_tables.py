@@ -59,7 +59,7 @@ def _beside(each: Code) -> str:
     """Return the NE 107 class of a cause, and the code that numbers the cause of an event."""
     if isinstance(each, Ne107Cause) and each:
         return f" ({CLASS[each].text})" if each in CLASS else " (class by the file)"
-    return f" (its cause is of {CAUSES[each].__name__})" if isinstance(each, EventKind) and each in CAUSES else ""
+    return f" (cause: {CAUSES[each].__name__})" if isinstance(each, EventKind) and each in CAUSES else ""
 
 
 def with_states(document: str) -> str:

@@ -340,13 +340,13 @@ class Rule(NamedTuple):
 
 
 MOVING = (
-    Rule((Out,), gone_far_enough, (Returning,), "the excursion is far enough beyond, and ends"),
-    Rule(COMMANDING, reference_far_off, (Sliding,), "a new reference lies far from a stem that moves"),
-    Rule(UNDER_WAY, overdue, (Waiting, Out), "no rest came in the longest time that a stem takes"),
+    Rule((Out,), gone_far_enough, (Returning,), "the stem is far enough beyond the reference"),
+    Rule(COMMANDING, reference_far_off, (Sliding,), "a new reference is far from a moving stem"),
+    Rule(UNDER_WAY, overdue, (Waiting, Out), "the stem has not rested within the longest time that it takes"),
 )
 AT_REST = (
     Rule(COMMANDING, there, (Idle,), "the stem is within the dead band"),
-    Rule(COMMANDING, as_near_as_slides_land, (Idle,), "the error is as slides leave it, or the stem is on its stop"),
+    Rule(COMMANDING, as_near_as_slides_land, (Idle,), "slides leave no smaller error, or the stem is on its stop"),
     Rule(COMMANDING, no_slide_left, (Idle, Stuck), "the move has used up its slides"),
     Rule(COMMANDING, one_slide, (Sliding, Returning, Idle, Stuck), "the error is more than the break-away distance"),
     Rule(COMMANDING, preslid, (Presliding,), "presliding reaches the reference"),
