@@ -58,7 +58,7 @@ def _said(each: Code) -> str:
 def _beside(each: Code) -> str:
     """Return the NE 107 class of a cause, and the code that numbers the cause of an event."""
     if isinstance(each, Ne107Cause) and each:
-        return f" ({CLASS[each].text})" if each in CLASS else " (class by the file)"
+        return f" ({CLASS[each].text[0]})" if each in CLASS else " (class by the file)"
     return f" (cause: {CAUSES[each].__name__})" if isinstance(each, EventKind) and each in CAUSES else ""
 
 

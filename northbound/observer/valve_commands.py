@@ -24,6 +24,8 @@ IDENTIFY_WITHIN_S = 600.0
 END_WITHIN_S = 5.0
 MINUTE_S = 60.0
 EXCITATION = ("eta_1", "eta_2", "eta_3")
+CALLED = {**dict.fromkeys(EXCITATION, "identification"), "experiment_consent": "a test on the valve"}
+"""What people call a register by what it is written for."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -49,7 +51,7 @@ def refusal_for(role: Role, *registers: str) -> str | None:
     for name in registers:
         needed = register_named(name).writer
         if role < needed:
-            return f"{'identification' if name in EXCITATION else name} needs the role {needed.name.lower()}"
+            return f"{CALLED.get(name, name)} needs the role {needed.name.lower()}"
     return None
 
 
@@ -109,7 +111,7 @@ class ValveCommands:
             asked_pu = dcs.get("reference")
             if not abs(asked_pu - seen_pu) <= SAME_PU:
                 now, then = (_as_read("reference", each) for each in (asked_pu, seen_pu))
-                return Confirmation(False, f"nothing was written: the reference is {now} by now, and was {then}")
+                return Confirmation(False, f"nothing was written: the reference is {now} now, it was {then}")
             to_pu = seen_pu if goes else min(max(dcs.get("position_signal"), 0.0), 1.0)
             dcs.set_and_read_back("reference", to_pu)
             return _confirm("mode", Mode.AUTOMATIC, dcs.set_and_read_back("mode", Mode.AUTOMATIC))

@@ -77,5 +77,5 @@ def _places(arguments: argparse.Namespace) -> "Iterator[Place]":
         yield Place(f"{where.host}:{where.port}", where.host, where.port, where.unit, tls=tls, tls_of=tls_of)
         return
     if said:
-        raise InputError(f"--{said[0]}", "is given, so --config must not be: the file says where")
+        raise InputError(f"--{said[0]}", "names the daemon, and so does --config: give one of them")
     yield from places_in(arguments.config, tls, tls_of)

@@ -39,8 +39,8 @@ if TYPE_CHECKING:
 
 TITLES = {"factory": "factory", "as_found": "as found", "as_left": "as left"}
 MARK = (
-    f"* off what is recommended by more than {THRESHOLDS.off:.0%} (an end: {THRESHOLDS.worth_of_span:.0%} of the "
-    f"travel or bench set's span), and by more than {THRESHOLDS.changed_sigmas:.0f} standard deviations"
+    f"* differs from the recommended figure by more than {THRESHOLDS.off:.0%} (an end: {THRESHOLDS.worth_of_span:.0%} "
+    f"of travel or bench set's span), and by more than {THRESHOLDS.changed_sigmas:.0f} standard deviations"
 )
 WIDTH, HEIGHT, EDGE = 640, 300, 56
 """Of a picture, in its own units."""
@@ -184,7 +184,7 @@ def as_html(report: ValveReport) -> str:
     title = f"Valve {report.valve}: as found and as left"
     parts = [
         f"<h1>{escape(title)}</h1><p class='quiet'>written {now:%Y-%m-%d %H:%M} UTC; every ± is two standard deviations"
-        f" or half a bracket; what cannot be determined says why; {MARK}</p>",
+        f" or half an interval; a figure that cannot be determined has its reason; {MARK}</p>",
         _findings(report),
         *(_section(report, each) for each in report.tests()),
         f"<section><h2>Configuration</h2><pre>{escape(_lines(report.configuration))}</pre></section>",
@@ -247,7 +247,7 @@ def _page(figures: Any, pdf: Any, title: str, text: str) -> None:
 
 
 def _findings(report: ValveReport) -> str:
-    told = report.findings() or ["no figure has changed that says what is wrong"]
+    told = report.findings() or ["no change of a figure points to a cause"]
     lines = "".join(f"<li>{escape(each)}</li>" for each in told)
     return f"<section><h2>What has changed</h2><ul>{lines}</ul></section>"
 

@@ -147,7 +147,7 @@ def partial_stroke(
     ]
     notes = [f"broken off: {played.problem}"] if broken_off else []
     if tolerance > asked.start * stroke_m:
-        notes.append(f"the noise makes {recording.kind.length.said(tolerance)} of the start tolerance")
+        notes.append(f"the start tolerance is {recording.kind.length.said(tolerance)}, because of the noise")
     if after is not None and not broken_off and abs(after.position_m - rest.position_m) > tolerance:
         notes.append("the stem is not quite where it was: friction holds it, and the law takes it back")
     if reference is None:
@@ -222,7 +222,7 @@ def _figures(
         Quantity("breakout_s", "time to the break-out", "s", out_s),
         Quantity("reached_m", "travel reached", "m", travel, asked.travel * stroke_m),
         Quantity("stroke_s", "time from the break-out to the travel", "s", within),
-        Quantity("friction_at_rate_pa", "friction as a pressure, lag and all", "Pa", friction),
+        Quantity("friction_at_rate_pa", "friction as a pressure, with the lag", "Pa", friction),
         Quantity("back_m", "back at, from where it was", "m", off),
         Quantity("noise_m", "noise at rest", "m", Figure(rest.noise_m)),
     ]

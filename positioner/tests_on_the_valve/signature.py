@@ -100,7 +100,7 @@ def signature(recordings: "list[Recording]", plate: Nameplate) -> Outcome:
     travel = difference(high, low)
     x_0 = 0.0 if low.value is None else low.value
     x_1 = plate.stroke_m if high.value is None else high.value
-    notes = [f"{each.reason}: the file's stroke stands for it" for each in (low, high) if each.reason]
+    notes = [f"{each.reason}: the file's stroke is used" for each in (low, high) if each.reason]
     rates = ", ".join(f"{1e-3 * each:.3g}" for each in ramps.rates_pa_per_s)
     notes.append(f"{len(ramps.lines)} ramps at {rates} kPa/s")
     verdict, told = _verdict(ramps, travel, 0.5 * (x_0 + x_1), plate)
@@ -129,7 +129,7 @@ def signature(recordings: "list[Recording]", plate: Nameplate) -> Outcome:
 
 def _without_motion(recordings: "list[Recording]", legs: list[Leg], plate: Nameplate) -> Outcome:
     if not legs:
-        why = "no ramp in the recording: the command goes nowhere one way for most of what it spans"
+        why = "no ramp in the recording: the command nowhere goes one way over most of its span"
         return Outcome("signature", plate.valve, (), (ValveTestVerdict.UNDETERMINED,), (why,))
     supply = supply_lacking(recordings)
     verdict = ValveTestVerdict.NO_SUPPLY if supply else ValveTestVerdict.NOT_MOVED
@@ -187,9 +187,9 @@ def _friction(ramps: Ramps, plate: Nameplate, x_0: float, x_1: float) -> list[Qu
     still, slow, lag = _half_apart(ramps, 0.5 * (x_0 + x_1))
     lag = replace(lag, plus_minus=still.plus_minus)
     return [
-        Quantity("friction_pa", "friction at half travel, taken to no rate", "Pa", still),
+        Quantity("friction_pa", "friction at half travel, extrapolated to rate 0", "Pa", still),
         *_force("friction_n", "friction", "N", still, plate),
-        Quantity("friction_at_rate_pa", "the same at the slowest rate, lag and all", "Pa", slow),
+        Quantity("friction_at_rate_pa", "the same at the slowest rate, with the lag", "Pa", slow),
         Quantity("lag_pa", "of it lag and viscous friction", "Pa", lag),
         Quantity("lag_s", "lag, over the rate: a time", "s", scaled(lag, 1.0 / ramps.rates_pa_per_s[0])),
     ]

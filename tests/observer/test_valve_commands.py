@@ -90,7 +90,7 @@ def test_automatic_goes_where_was_agreed_to_or_stays_where_the_stem_is(daemon: D
 def test_a_reference_that_has_changed_since_the_question_moves_nothing(daemon: Daemon) -> None:
     daemon.values |= {"mode": Mode.HOLD, "reference": 0.9, "position": 0.2}
     seen = daemon.commands.automatic(Role.ENGINEER, 0.7, goes=True)
-    assert seen == Confirmation(False, "nothing was written: the reference is 90 % by now, and was 70 %")
+    assert seen == Confirmation(False, "nothing was written: the reference is 90 % now, it was 70 %")
     assert daemon.writes == []
     assert not daemon.commands.automatic(Role.OPERATOR, 0.9, goes=True).done, "mode needs an engineer"
 

@@ -86,6 +86,6 @@ def test_one_at_a_time_and_broken_off_by_whoever_began_it(monkeypatch: pytest.Mo
 
 def test_who_may_not_consent_or_has_no_file_is_told_so(monkeypatch: pytest.MonkeyPatch) -> None:
     tests, registers = panel(monkeypatch, PASSES)
-    assert begun(tests, role=Role.OPERATOR) == Confirmation(False, "experiment_consent needs the role engineer")
+    assert begun(tests, role=Role.OPERATOR) == Confirmation(False, "a test on the valve needs the role engineer")
     assert "needs the daemon's file" in begun(ValveTests(Place("FV-1", "localhost", 5502, 1))).text
     assert registers.written == []

@@ -43,7 +43,7 @@ def test_without_a_file_an_address_is_enough() -> None:
     [
         (["--config", "nowhere.toml"], "nowhere.toml"),
         (["--config", "a.toml", "--config", "a.toml"], "a.toml: valve.name: 'FV-101' is also in another file"),
-        (["--config", "a.toml", "--port", "802"], "--port: is given, so --config must not be"),
+        (["--config", "a.toml", "--port", "802"], "--port: names the daemon, and so does --config"),
         (["--port", "99999"], "the daemon: port: "),
         (["--roles", "nowhere.json"], "nowhere.json: cannot be read"),
         (["--set-password", "operator"], "--set-password: needs --roles FILE"),

@@ -26,7 +26,7 @@ def test_an_engineer_consents_begins_a_test_and_takes_the_report(tmp_path: Path)
         served("page", "--config", str(site.config), "--roles", str(roles)) as address,
         opened(address) as page,
     ):
-        expect(page.get_by_test_id("tests-why")).to_have_text("experiment_consent needs the role engineer")
+        expect(page.get_by_test_id("tests-why")).to_have_text("a test on the valve needs the role engineer")
         expect(page.get_by_test_id("begin-test")).to_be_disabled()
         page.get_by_test_id("door").click()
         sign_in(page, "engineer", PASSWORDS["engineer"])

@@ -85,7 +85,7 @@ def test_every_column_that_tables_of_plants_have_is_there_with_its_plus_minus(si
         assert all("±" in cell for cell in rows[name][2:4]), rows[name]
     assert rows["figure"] == ["figure", "recommended", "as found", "as left"]
     assert rows["seat load"][1] == "1200 N"
-    friction = rows["friction at half travel, taken to no rate"]
+    friction = rows["friction at half travel, extrapolated to rate 0"]
     assert [cell.endswith("*") for cell in friction[1:4]] == [False, True, False], "6 kPa: twice of it was found"
     assert rows["opens within"][-1] == "1.100 ± 0.050 s"
     assert rows["closes within"][-1].startswith("cannot be determined: longer than")

@@ -185,7 +185,7 @@ def test_the_command_reads_recordings_and_moves_nothing(tmp_path: Path, capsys: 
     assert main(words) == 2
     assert "--stroke-m: is required with --rec" in capsys.readouterr().err
     assert main([*words, "--stroke-m", str(STROKE_M), "--json", str(tmp_path / "told.json")]) == 0
-    assert "friction at half travel, taken to no rate" in capsys.readouterr().out
+    assert "friction at half travel, extrapolated to rate 0" in capsys.readouterr().out
     site = tmp_path / "site.toml"
     site.write_text(f"[valve]\nstroke_m = {STROKE_M}\n")
     assert main(["signature", str(site)]) == 2

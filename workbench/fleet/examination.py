@@ -292,7 +292,7 @@ def _outcome_of_refit(changes: Sequence[Change], request: Request) -> dict[str, 
         return {"outcome": CHANGED, "sentence": f"first fitted: {told or 'as the drawing says'}"}
     if changes:
         return {"outcome": CHANGED, "sentence": f"changed: {told}"}
-    return {"outcome": AS_BEFORE, "sentence": "as the last model says, its parameters within what they were known to"}
+    return {"outcome": AS_BEFORE, "sentence": "as the last model says, parameters within their intervals"}
 
 
 def changes_of(model: ValveFile, parameters: Mapping[str, Fitted]) -> tuple[Change, ...]:

@@ -38,7 +38,7 @@ class Joint:
         if self.probability is None:
             return f"{of}: insufficient"
         if self.probability < LIMITS.sticks_probability or self.stiction_pct is None:
-            return f"{of}: not said to stick ({100 * self.probability:.0f} % sticks)"
+            return f"{of}: not called sticking (probability {100 * self.probability:.0f} %)"
         size, low, high = self.stiction_pct
         return (
             f"{of}: the valve sticks ({min(99.0, 100 * self.probability):.0f} %): "

@@ -77,7 +77,8 @@ class LoopDiagnosis(Result):
             said = "; ".join(each.says for each in self.gates)
             instead = "; ".join(dict.fromkeys(each.instead for each in self.gates))
             return f"{self.record.name}: insufficient: {said}; record {instead}"
-        return f"{self.record.name}: cannot be told ({100 * (self.probability or 0.0):.0f} % sticks): {OPEN}"
+        percent = 100 * (self.probability or 0.0)
+        return f"{self.record.name}: cannot be told (probability of sticking {percent:.0f} %): {OPEN}"
 
     @property
     def sticks_said(self) -> str:
@@ -100,7 +101,7 @@ class LoopDiagnosis(Result):
         better = [(r.error_ratio, r) for r in self.remedies[1:] if r.error_ratio is not None and r.error_ratio < 1.0]
         first = "to do: maintenance of the valve, packing and positioner"
         if not better:
-            return first + ("" if self.remedies else "; no settings, for the controller's law is not seen")
+            return first + ("" if self.remedies else "; no settings: the record does not show the controller's law")
         _, least = min(better, key=lambda each: each[0])
         ratios = f"error {ratio(least.error_ratio)} of now, travel {ratio(least.travel_ratio)}"
         return f"{first}; until then {least.name}, {least.settings}: {ratios}, simulated"
@@ -203,7 +204,7 @@ class LoopDiagnosis(Result):
         return figure  # type: ignore[no-any-return]
 
 
-REMEDIES = "Over today's, simulated on the identified loop (– if that does not swing as the record does):"
+REMEDIES = "Over today's values, simulated on the identified loop (–: that loop does not swing as the record does):"
 ACTS = {
     1: "reverse acting, OP falls as PV rises",
     -1: "direct acting, OP rises as PV rises",

@@ -32,7 +32,7 @@ WORDS = {
     "Apparent stiction S": "How far the output must go, after a turn, before the stem moves: dead band and stick band.",
     "Slip jump J": "How far the stem jumps when it breaks loose.",
     "Evidence": "What friction explains better than the best other cause, as difference of log-likelihoods, in nats.",
-    "Sticks, %": "Probability, calibrated on drawn loops of other equations; at 95 % at most one in 20 is wrong there.",
+    "Sticks, %": "Probability, calibrated on loops simulated by other equations: at 95 % at most one of 20 is wrong.",
 }
 
 
@@ -131,8 +131,8 @@ def _pictures(each: LoopDiagnosis, name: str, most: int) -> list[page.Html]:
 
 
 TIME_CAPTION = "OP, PV and SP over time; the stem as it is fitted."
-PATH_CAPTION = "PV over OP: as recorded, and as a stem that sticks and slips has it."
-SPECTRUM_CAPTION = "Amplitude of OP and PV by period, each of its largest."
+PATH_CAPTION = "PV over OP: as recorded, and as a sticking stem gives it."
+SPECTRUM_CAPTION = "Amplitude of OP and PV by period, each over its largest."
 
 
 def _over_time(each: LoopDiagnosis, path: FittedPath | None, most: int) -> Figure:

@@ -78,7 +78,7 @@ def _of_storage(record: LoopRecord) -> Iterator[Gate]:
         if (share := straight_share(values)) > LIMITS.most_straight:
             yield Gate(
                 "compressed",
-                f"the historian drew {100 * share:.0f} % of the {name} on straight lines",
+                f"{100 * share:.0f} % of the {name} lie on straight lines, as a historian interpolates",
                 "raw values: compression and exception deviation at zero",
             )
         if (levels := np.unique(values).size) < LIMITS.fewest_levels:

@@ -165,7 +165,7 @@ def run_diagnosis(
             over=lambda: time.monotonic() > end_s,
         )
     except BrokenOff:
-        raise CommandFailed("the time was over before the valve as it is was fitted: nothing is known") from None
+        raise CommandFailed("the time was over before the given valve was fitted: nothing is known") from None
 
 
 def run_extension(

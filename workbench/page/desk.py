@@ -461,7 +461,7 @@ def name_valve(text: str, name: str = "") -> NamedValve:
     if name and left_behind:
         raise InputError(
             name,
-            f"names {' and '.join(left_behind)}, an effect of your own, which does not come with a valve file that is "
-            "dropped here: start positioner workbench --valve FILE where both are",
+            f"names {' and '.join(left_behind)}, an effect of your own; a dropped valve file does not bring it: start "
+            "positioner workbench --valve FILE in the folder of both",
         )
     return NamedValve(name or text, path, file)

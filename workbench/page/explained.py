@@ -15,7 +15,7 @@ WORDS = {name.lower(): text for name, text in (COMPARISON | DIAGNOSIS_WORDS).ite
     "slips": f"{COMPARISON['Slip']} Matched: model and stem slip at about the same time. Missed: only the "
     "stem slips. Spurious: only the model slips.",
     "preview": "How much of the error a weak effect of each kind would explain, before any was fitted. It names the "
-    "right effect in some two of three cases, and is no verdict.",
+    "right effect in about two of three cases, and is no verdict.",
     "step": "Each step tries every effect beside those found before.",
 }
 SHOWS = 'class="text-body2 q-pa-sm" style="max-width: 320px; white-space: normal"'

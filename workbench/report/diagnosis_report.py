@@ -36,8 +36,8 @@ DIAGNOSIS_WORDS = {
     f"where nothing was fitted, no price is taken: above {LEAST_HELD_OUT:g} it counts.",
     "95 % interval": "The parameter lies in it with a probability of 95 %.",
     "Rival": "An effect that explains the recording as well as the one that was added.",
-    "Told simulation": "The simulation is told when the stem moves, as the recording shows it. It says where the stem "
-    "goes.",
+    "Told simulation": "The simulation is told when the stem moves, as the recording shows it. It computes where the "
+    "stem goes.",
 }
 
 
@@ -274,7 +274,7 @@ def _next(diagnosis: Diagnosis, commands: Sequence[str]) -> page.Html:
         "What to do next",
         page.text(
             f"Play this command to the valve: {chosen.name}. Of a menu of commands it tells the rivals apart best: "
-            f"refitted to the answer, the wrong one is left with an error of {chosen.separation:.3g} times the "
+            f"even refitted to the answer, the wrong rival leaves an error of {chosen.separation:.3g} times the "
             "sensor's noise. It stays within the pressures of the recording and begins at rest.",
         ),
         page.plot(
@@ -361,7 +361,7 @@ def _preview(diagnosis: Diagnosis) -> page.Html:
         "preview",
         "For specialists: the first guess, before any effect was fitted",
         page.text(
-            "Share of the error that a weak effect of each kind would explain. It names the right effect in some two "
+            "Share of the error that a weak effect of each kind would explain. It names the right effect in about two "
             "of three cases."
         ),
         page.table("table-preview", ["Effect", "Share"], rows),

@@ -60,9 +60,9 @@ def show_tried(steps: Sequence[RankedStep], floor: float | None, of: Quantity) -
     """Return the section of all steps."""
     shown = [
         text(
-            "Each effect of the library was added in turn and the whole model refitted with it. "
-            f"An effect is accepted if its evidence exceeds {LEAST_BIC:g} on what was fitted and {LEAST_HELD_OUT:g} on "
-            "what was held out, and its parameters are physically possible."
+            "Each effect was added in turn, and the whole model refitted with it. "
+            f"An effect is accepted if its evidence exceeds {LEAST_BIC:g} on the fitted part and {LEAST_HELD_OUT:g} on "
+            "the held-out part, and its parameters are physically possible."
         )
     ]
     dashed = "dashed the floor, " if floor is not None else ""
