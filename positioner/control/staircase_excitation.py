@@ -52,7 +52,10 @@ MANY_EACH = 8
 WIDE = 0.5
 """Of the window, over which the landings of each direction must lie: what changes over the travel shows there."""
 GAVE_WAY = 0.3
-"""Of the way that the rise was worth before: a stem that moved less was not broken loose, its packing gave way."""
+"""Of the way that the rise was worth before: a stem that moved less was not broken loose, its packing gave way.
+
+One that moved so far by its last step did slide. The rise before took friction up, as before the first slide
+after a turn."""
 LEAP = 3.0
 """Rises of the slide before: a rise beyond it is not asked for, for the slope may be that of a packing."""
 NOT_COMPLETE = 0.99
@@ -237,8 +240,11 @@ class Staircase:
         if not outcome.moved:
             return self if first else replace(self, low_pa=max(self.low_pa, self.rise_pa))
         went_m = abs(outcome.position_m - outcome.from_m)
-        if not first and 0.0 < went_m * self.slope_pa_per_m < GAVE_WAY * self.rise_pa:
-            return replace(self, low_pa=max(self.low_pa, self.rise_pa))
+        worth_pa = went_m * self.slope_pa_per_m
+        if not first and 0.0 < worth_pa < GAVE_WAY * self.rise_pa:
+            if worth_pa < GAVE_WAY * self.step_pa:
+                return replace(self, low_pa=max(self.low_pa, self.rise_pa))
+            first = True  # the rest of the rise took friction up
         going_m = self.going_m + went_m if outcome.landing and not first else self.going_m
         counted = replace(
             self._having_needed(outcome),

@@ -37,9 +37,15 @@ UNDER_WAY = Staircase(80e3, direction=1, slide_m=0.002, high_pa=1.6e3, slope_pa_
 
 
 def test_a_stem_whose_packing_gave_way_has_not_been_broken_loose() -> None:
-    """After 8 kPa it should have gone 10 mm; it went 1 mm. The slope stays what it was."""
-    stairs = replace(UNDER_WAY, rise_pa=8e3).counted(outcome(1, 0.05, 0.051), LIMITS)
+    """After 8 kPa it should have gone 10 mm; it went 1 mm, by a step worth 5 mm. The slope stays."""
+    stairs = replace(UNDER_WAY, rise_pa=8e3, step_pa=4e3).counted(outcome(1, 0.05, 0.051), LIMITS)
     assert (stairs.low_pa, stairs.rise_pa, stairs.ups, stairs.slope_pa_per_m) == (8e3, 8e3, 0, 0.8e6)
+
+
+def test_a_stem_that_goes_as_far_as_its_last_step_has_slid_however_much_took_friction_up() -> None:
+    """It gave way at a turn; the rise then took friction up, before it slid by 2.5 mm, of 2 kPa."""
+    stairs = replace(UNDER_WAY, rise_pa=19e3, step_pa=1.8e3).counted(outcome(1, 0.05, 0.0525), LIMITS)
+    assert (stairs.low_pa, stairs.rise_pa, stairs.ups, stairs.slope_pa_per_m) == (0.0, 0.0, 1, 0.8e6)
 
 
 def test_a_rise_does_not_leap() -> None:

@@ -1,6 +1,7 @@
 """S3 by a staircase finds a packing that needs more than the spring takes over the stroke, by its own slides."""
 
 from collections.abc import Callable
+from dataclasses import replace
 
 import pytest
 
@@ -72,3 +73,14 @@ def test_friction_that_has_doubled_is_found(
     assert found.applied.ratios is not None
     friction_pa = factor * SEED_LIKE.coulomb_n / SEED_LIKE.area_m2
     assert -found.applied.ratios.k_over_c == pytest.approx(friction_pa, rel=0.01)
+
+
+def test_a_heavy_stem_that_gives_way_before_it_slides_is_found_within_its_deviations() -> None:
+    """Its slide did not count, for friction was taken up in the same rise: the staircase turned round, in vain."""
+    heavy = replace(with_friction(SEED_LIKE, 2.0), mass_kg=60.0)
+    found = identified(OtherPlant(heavy, PERIOD_S, at_pu=0.3, noise_std_m=1e-5), 420e3)
+    assert (found.fault, found.applied.count) == (Fault.NONE, 1)
+    friction_pa = heavy.coulomb_n / heavy.area_m2
+    for each in (found.static_law.up, found.static_law.down):
+        assert each.value == pytest.approx(friction_pa, abs=3.0 * each.std)
+    assert max(found.static_law.up.std, found.static_law.down.std) < 0.05 * friction_pa
