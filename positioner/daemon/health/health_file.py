@@ -10,27 +10,17 @@ import json
 from collections.abc import Mapping
 from dataclasses import asdict, dataclass, fields, replace
 from pathlib import Path
+from typing import Annotated, Literal
 
-from pydantic import Field, ValidationError
+from pydantic import Field
 
 from config.errors import InputError
-from config.loading import Many, NonNegative, Schema
+from config.loading import Fraction, Many, NonNegative, Schema, between, validate
 from config.whole_file import replace_whole
 from positioner.daemon.health.daily_figures import OperationDay
 from positioner.daemon.health.valve_conditions import CauseName, KeptConditions
 
-VERSION = 1
-WHOLE = frozenset({"reversals", "moves_judged"})
-ALLOWED: Mapping[str, tuple[float, float]] = {
-    "travel_m": (0.0, 1e9),
-    "reversals": (0, 2**32 - 1),
-    "stiction_index": (0.0, 1.0),
-    "moves_judged": (0, 2**32 - 1),
-    "baseline_pa": (1e-3, 1e12),
-}
-"""Of each count, and of the friction in the drive's own unit: no valve comes so far, and a register can hold it."""
-SCALES = "scales"
-MORE = "more"
+VERSION: Literal[1] = 1
 Scales = Mapping[str, str]
 """Of the device's pressures: keys of the configuration and their values."""
 
@@ -66,8 +56,21 @@ class KeptMore(Schema):
 NOTHING_MORE = KeptMore()
 
 
-class _Unreadable(Exception):
-    pass
+class _KeptFile(Schema):
+    """The file. No valve comes so far as its counts may, and a register can hold each."""
+
+    version: Literal[1]
+    valve: str
+    travel_m: Annotated[float, between(0.0, 1e9)]
+    reversals: Annotated[int, between(0, 2**32 - 1)]
+    stiction_index: Fraction
+    moves_judged: Annotated[int, between(0, 2**32 - 1)]
+    baseline_pa: Annotated[float, between(1e-3, 1e12)] | None
+    """In the drive's own unit."""
+    scales: dict[str, str] = Field(default_factory=dict)
+    """Kept since the second form of the file, and"""
+    more: KeptMore = NOTHING_MORE
+    """since the third."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -98,15 +101,17 @@ def read_record(path: Path, valve: str, scales: Scales) -> KeptHealth:
     except FileNotFoundError:
         return KeptHealth()
     try:
-        record, before, more = _parsed(text, valve)
-    except _Unreadable as error:
+        kept = _parsed(path, text, valve)
+    except InputError as error:
         path.replace(path.with_name(path.name + ".unreadable"))
-        return KeptHealth(problem=str(error))
+        return KeptHealth(problem=error.problem)
+    record = HealthRecord(**{each.name: getattr(kept, each.name) for each in fields(HealthRecord)})
+    before = kept.scales
     others = [f"{key} was {before[key]}, is {now}" for key, now in scales.items() if before.get(key, now) != now]
     if record.baseline_pa is None or not others:
-        return KeptHealth(record, more=more)
+        return KeptHealth(record, more=kept.more)
     dropped = f"{others[0]}; it was {record.baseline_pa:.7g} Pa"
-    return KeptHealth(replace(record, baseline_pa=None), rescaled=dropped, more=more)
+    return KeptHealth(replace(record, baseline_pa=None), rescaled=dropped, more=kept.more)
 
 
 def kept_days(path: Path, valve: str) -> tuple[OperationDay, ...]:
@@ -116,10 +121,10 @@ def kept_days(path: Path, valve: str) -> tuple[OperationDay, ...]:
         InputError: the file cannot be read.
     """
     try:
-        return _parsed(path.read_bytes(), valve)[2].days
+        return _parsed(path, path.read_bytes(), valve).more.days
     except FileNotFoundError:
         return ()
-    except (OSError, _Unreadable) as error:
+    except OSError as error:
         raise InputError(str(path), f"the health record cannot be read: {error}") from None
 
 
@@ -129,43 +134,21 @@ def write_record(path: Path, valve: str, record: HealthRecord, scales: Scales, m
     Raises:
         OSError: it cannot be written.
     """
-    content = {"version": VERSION, "valve": valve, **asdict(record), SCALES: dict(scales)}
-    content[MORE] = more.model_dump(mode="json")
-    replace_whole(path, json.dumps(content, allow_nan=False) + "\n")
+    content = {"version": VERSION, "valve": valve, **asdict(record), "scales": dict(scales)}
+    replace_whole(path, json.dumps({**content, "more": more.model_dump(mode="json")}, allow_nan=False) + "\n")
 
 
-def _parsed(text: bytes, valve: str) -> tuple[HealthRecord, Scales, KeptMore]:
+def _parsed(path: Path, text: bytes, valve: str) -> _KeptFile:
+    """Return what a file holds.
+
+    Raises:
+        InputError: it is not of this form, or another valve's.
+    """
     try:
         content = json.loads(text)
     except (ValueError, RecursionError) as error:
-        raise _Unreadable(f"is not JSON: {str(error).partition(';')[0]}") from None
-    names = {field.name for field in fields(HealthRecord)}
-    if not isinstance(content, dict) or content.keys() - {SCALES, MORE} != names | {"version", "valve"}:
-        raise _Unreadable(f"must hold version, valve, {', '.join(sorted(names))}, {SCALES}, {MORE} and nothing else")
-    for key, allowed in (("version", VERSION), ("valve", valve)):
-        if content[key] != allowed:
-            raise _Unreadable(f"{key}: allowed is {allowed!r}, got {content[key]!r}")
-    for name in names:
-        if problem := _problem(name, content[name]):
-            raise _Unreadable(f"{name}: {problem}, got {content[name]!r:.40}")
-    scales = content.get(SCALES, {})  # kept since the second form of the file only
-    if not isinstance(scales, dict) or not all(isinstance(each, str) for each in scales.values()):
-        raise _Unreadable(f"{SCALES}: must be a table of texts, got {scales!r}")
-    try:
-        more = KeptMore.model_validate(content.get(MORE, {}))  # kept since the third form of the file only
-    except ValidationError as error:
-        first = error.errors()[0]
-        raise _Unreadable(f"{MORE}.{'.'.join(map(str, first['loc']))}: {first['msg']}") from None
-    return HealthRecord(**{name: content[name] for name in names}), scales, more
-
-
-def _problem(name: str, value: object) -> str | None:
-    least, most = ALLOWED[name]
-    if value is None and name == "baseline_pa":
-        return None
-    kinds = int if name in WHOLE else int | float
-    if isinstance(value, kinds) and not isinstance(value, bool) and least <= value <= most:
-        return None
-    return f"must be {'a whole' if name in WHOLE else 'a'} number from {least:g} to {most:g}" + (
-        ", or null" if name == "baseline_pa" else ""
-    )
+        raise InputError(str(path), f"is not JSON: {str(error).partition(';')[0]}") from None
+    kept = validate(_KeptFile, content, str(path))
+    if kept.valve != valve:
+        raise InputError(str(path), f"valve: allowed is {valve!r}, got {kept.valve!r}")
+    return kept
