@@ -197,7 +197,9 @@ class Link:
                 told_pa, self._told_pa = self._told_pa, None
                 reading = self._driver.read() if self._settings.shadow else self._driver.exchange(command_pa)
                 self._take(reading, command_pa, told_pa)
-            elif (self._unattended_s > 0 or self._backoff.may_try(now_s)) and self._enters(door := self._door):
+            elif (self._unattended_s > 0 or self._backoff.may_try(now_s)) and (
+                (door := self._door) is None or door.acquire(blocking=False)
+            ):
                 self._lost_a_reply = False
                 try:
                     self._sample = self._found_again()
@@ -297,15 +299,10 @@ class Link:
 
     @property
     def _door(self) -> Semaphore | None:
-        """Where it waits to connect; None: nowhere."""
+        """Where it may find its way closed before it connects; None: nowhere."""
         if self._doors is None:
             return None
         return self._doors.lost_a_reply if self._lost_a_reply else self._doors.away
-
-    @staticmethod
-    def _enters(door: Semaphore | None) -> bool:
-        """Return whether a door lets it connect now."""
-        return door is None or door.acquire(blocking=False)
 
     def _notice_a_stall(self, now_s: float, command_pa: float) -> None:
         """Have a device that was left alone looked at before it is commanded; say so where this daemon stood still."""

@@ -17,10 +17,9 @@ from config.loading import Many, NonNegative, Positive, Schema
 from config.travel import Travel
 from positioner.control.controller_memory import Decision
 from positioner.control.sample import Sample
+from positioner.daemon.health.daily_figures import DAY_S
 from positioner.daemon.health.packing_tests import FoundFriction, PackingLimits, PackingTests
 from positioner.daemon.health.position_limits import PositionLimits
-
-DAY_S = 86_400.0
 
 
 def _cause(name: str) -> str:

@@ -3,8 +3,9 @@
 import math
 from typing import Annotated, Any, Literal
 
-from pydantic import BaseModel, ConfigDict, Field, ValidationError
+from pydantic import Field, ValidationError
 
+from config.loading import Schema
 from positioner.control.valve_knowledge import ValveKnowledge
 from positioner.estimation.acceptance import Ratios
 from positioner.estimation.estimates import Directions
@@ -23,11 +24,7 @@ Pressure = Annotated[float, Field(ge=-1e9, le=1e9)]
 Figure = Annotated[float, Field(ge=-1e30, le=1e30)]
 
 
-class _Record(BaseModel):
-    model_config = ConfigDict(extra="forbid", frozen=True, allow_inf_nan=False, strict=True)
-
-
-class _Slide(_Record):
+class _Slide(Schema):
     time_s: float = Field(le=0.0)
     direction: int
     from_m: Place
@@ -41,14 +38,14 @@ class _Slide(_Record):
     from_pa: Pressure | None = None
 
 
-class _Interval(_Record):
+class _Interval(Schema):
     held_m: Length
     broke_m: Length | None
     """None: nothing has broken loose."""
     seen: bool
 
 
-class KnowledgeRecord(_Record):
+class KnowledgeRecord(Schema):
     """What is kept of a valve; SI units."""
 
     b_over_c_pa_per_m: float = Field(ge=-1e12, le=-1.0)

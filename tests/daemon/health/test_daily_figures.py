@@ -142,7 +142,7 @@ def test_days_are_kept_served_and_printed(tmp_path: Path, capsys: pytest.Capture
         assert "cycle span" in capsys.readouterr().out
         stored.path.write_text("{")
         assert main(["health", "--config", str(config)]) == 2
-        assert "the health record cannot be read: is not JSON" in capsys.readouterr().err
+        assert "FV-1.health.json: is not JSON" in capsys.readouterr().err
     finally:
         server.stop()
     with pytest.raises(InputError):
