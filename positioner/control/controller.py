@@ -496,7 +496,6 @@ def _seen(
         ratios=ratios,
         outcome=outcome,
         statics=now.memory.statics,
-        valve=now.settings.valve,
     )
 
 

@@ -62,7 +62,7 @@ def test_a_reference_beyond_a_known_stop_ends_there_and_teaches_nothing() -> Non
 def test_break_away_is_the_valves_own_over_its_travel() -> None:
     _, extended = switched_on("position_friction")
     balance = Balance(ratios=straight_law(extended), landings=(), held=(), stroke_m=STROKE_M, valve=extended)
-    first = balance.first_distances(1e-3, told=False)
+    first = balance.first_distances(None)
     for share in (0.2, 0.8):
         for s in (1, -1):
             there = first.at(s, turning=True, local=balance.local(share * STROKE_M))

@@ -15,7 +15,6 @@ from typing import ClassVar, NamedTuple, Protocol, Self
 
 from config.codes import InhibitReason
 from config.daemon_file import DaemonFile
-from config.extended_valve import ExtendedValve
 from positioner.control.records import by_name
 from positioner.control.sample import Sample
 from positioner.control.valve_knowledge import ValveKnowledge
@@ -43,8 +42,6 @@ class Seen(NamedTuple):
     """Of the last change of the command, in the step in which it is known."""
     statics: StaticIdentification
     """Rests and landings of the stem, and the static law that they give."""
-    valve: ExtendedValve | None
-    """Whose effects are known: then the law works with its inverse."""
 
 
 seen_of = by_name(Seen)

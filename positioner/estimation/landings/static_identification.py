@@ -51,7 +51,8 @@ class StaticIdentification:
         balances: the same, each where its balance is: a stem that swings sticks past it.
         held: changes of the command that did not move the stem, the latest first.
         law: from the landings.
-        valve: the extended valve, as long as the landings do not say that it is another.
+        sensor: the valve whose sensor and play are known, whatever the landings say.
+        valve: the same, as long as the landings do not say that it is another.
         way: direction in which the stem moved last, 0 if it has not.
     """
 
@@ -63,7 +64,7 @@ class StaticIdentification:
         valve: ExtendedValve | None = None,
     ) -> None:
         self._stroke_m = stroke_m
-        self._valve = self.valve = valve
+        self.sensor = self.valve = valve
         self.way = 0
         self._each = each
         known_m = None if valve is None else valve.stops_indicated_m
@@ -107,8 +108,8 @@ class StaticIdentification:
         outcome = self.detector.update(time_s, position_m, command_pa, pressure_pa, arrived=arrived)
         if outcome is None:
             return None
-        if self._valve is not None:
-            outcome = self._of_stem(outcome, self._valve)
+        if self.sensor is not None:
+            outcome = self._of_stem(outcome, self.sensor)
         off_m, near_m = self._off_m(outcome)
         if outcome.landing and self._gave_way(outcome, off_m, near_m):
             outcome = outcome._replace(moved=False, landing=False)
@@ -132,8 +133,8 @@ class StaticIdentification:
         if not law.valid:
             return False
         position_m = supposed.rest.position_m
-        if self._valve is not None:
-            position_m = self._valve.stem_m(position_m, s or self.way)
+        if self.sensor is not None:
+            position_m = self.sensor.stem_m(position_m, s or self.way)
         down_pa, up_pa = (self._balance.pressure_pa(position_m, way) for way in (-1, 1))
         low_pa, high_pa = (up_pa if s > 0 else down_pa), (down_pa if s < 0 else up_pa)
         near_pa = AS_COMMANDED * -law.ratios.b_over_c * self._stroke_m
@@ -153,8 +154,8 @@ class StaticIdentification:
         both = (*self._in_direction[1], *self._in_direction[-1])
         landings = tuple(sorted(both, key=lambda each: -each.time_s))
         self.law = static_law(landings, self._stroke_m)
-        if self._valve is not None:
-            self.valve = None if contradicted(self._valve, self.law) else self._valve
+        if self.sensor is not None:
+            self.valve = None if contradicted(self.sensor, self.law) else self.sensor
         self.landings = self.law.slides if self.law.valid else landings
         self.balances = tuple(balanced(each, self.law.swing) for each in self.landings)
         self._balance = LocalBalance(ratios=self.law.ratios, landings=self.balances, stroke_m=self._stroke_m)

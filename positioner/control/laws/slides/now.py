@@ -34,11 +34,11 @@ class Now:
     @classmethod
     def of(cls, seen: Seen, balance: Balance, bounds: SlideBounds) -> "Now":
         """Return what a step is decided from, by what the law is shown."""
-        detector, position_m = seen.statics.detector, seen.sample.position_m
+        detector, sensor, position_m = seen.statics.detector, seen.statics.sensor, seen.sample.position_m
         rest, quantum_m = detector.rest, detector.quantum_m
-        if seen.valve is not None:
-            stem_m, way = seen.valve.stem_m, seen.statics.way
-            position_m, quantum_m = stem_m(position_m, way), max(quantum_m, seen.valve.inverse.quantum_m)
+        if sensor is not None:
+            stem_m, way = sensor.stem_m, seen.statics.way
+            position_m, quantum_m = stem_m(position_m, way), max(quantum_m, sensor.inverse.quantum_m)
             rest = None if rest is None else replace(rest, position_m=stem_m(rest.position_m, way))
         return cls(
             now_s=seen.sample.now_s,

@@ -66,18 +66,20 @@ class Balance(LocalBalance):
     def _middle_m(self) -> float:
         return self.going_on_m(THRESHOLDS.middle * self.stroke_m)
 
-    def first_distances(self, guess_m: float, *, told: bool) -> BreakawayDistance:
-        """Return the break-away distances before a slide of the law: those of the extended valve, or of the staircase.
+    def first_distances(self, breakaway_pa: float | None) -> BreakawayDistance:
+        """Return the break-away distances before a slide of the law, by what is told of F_s/A, Pa; None: nothing is.
 
-        Args:
-            guess_m: where no slide has landed in a direction.
-            told: whether that is known, and no guess.
+        They are those of the extended valve, or of the staircase, or a guess where no slide has landed in a direction.
         """
         if self.valve is not None:
-            up_m, down_m = (self._margin_m(self.valve, THRESHOLDS.middle * self.stroke_m, s) for s in (1, -1))
-            up, down = (Interval(each / THRESHOLDS.return_margin, each, seen=True) for each in (up_m, down_m))
+            both_m = (self._margin_m(self.valve, THRESHOLDS.middle * self.stroke_m, s) for s in (1, -1))
+            up, down = (Interval(each / THRESHOLDS.return_margin, each, seen=True) for each in both_m)
             return BreakawayDistance(up, down, up, down)
-        return BreakawayDistance(*(self._first(s, Interval(broke_m=guess_m, seen=told)) for s in (1, -1)))
+        guess_m = THRESHOLDS.first_distance * self.friction_m
+        if breakaway_pa is not None:
+            guess_m = max(guess_m, (breakaway_pa + self.ratios.k_over_c) / -self.ratios.b_over_c)
+        guess = Interval(broke_m=guess_m, seen=breakaway_pa is not None)
+        return BreakawayDistance(self._first(1, guess), self._first(-1, guess))
 
     def _first(self, direction: int, guess: Interval) -> Interval:
         """Return the shortest way that has landed in a direction, and the longest below it that held."""

@@ -24,7 +24,6 @@ from positioner.control.laws.slides.teaching import after_outcome
 from positioner.control.laws.slides.transitions import after
 from positioner.control.valve_knowledge import ValveKnowledge
 from positioner.estimation.acceptance import Ratios
-from positioner.estimation.landings.breakaway_distance import BreakawayDistance
 from positioner.estimation.landings.static_identification import StaticIdentification
 
 
@@ -120,7 +119,7 @@ def stepped(memory: SlideMemory, now: Now) -> SlideMemory:
     """Return what is remembered after one step in which the law commands."""
     bounds, reference_m = now.bounds, now.reference_m
     if memory.distances is None:
-        memory = replace(memory, distances=first_distances(now.balance, bounds))
+        memory = replace(memory, distances=now.balance.first_distances(bounds.breakaway_pa))
     if isinstance(memory.state, Watching):
         memory = replace(memory, state=Idle())
     if memory.course is None:
@@ -131,14 +130,6 @@ def stepped(memory: SlideMemory, now: Now) -> SlideMemory:
     if now.outcome is not None:
         memory = after_outcome(memory, now.outcome, now)
     return after(memory, now)
-
-
-def first_distances(balance: Balance, bounds: SlideBounds) -> BreakawayDistance:
-    """Return the break-away distances before any slide of the law."""
-    guess_m, told = bounds.thresholds.first_distance * balance.friction_m, bounds.breakaway_pa is not None
-    if bounds.breakaway_pa is not None:
-        guess_m = max(guess_m, (bounds.breakaway_pa + balance.ratios.k_over_c) / -balance.ratios.b_over_c)
-    return balance.first_distances(guess_m, told=told)
 
 
 def balance_after(before: Balance | None, ratios: Ratios, seen: Seen, stroke_m: float) -> Balance:

@@ -102,10 +102,8 @@ class Waiting:
 class Stuck:
     """No slide that a bound allows breaks the stem loose."""
 
-    at_m: float
 
-
-WATCHING = Watching()
+WATCHING, STUCK = Watching(), Stuck()
 State = Watching | Idle | Sliding | Out | Returning | Presliding | Waiting | Stuck
 STATES: tuple[type[State], ...] = (Watching, Idle, Sliding, Out, Returning, Presliding, Waiting, Stuck)
 

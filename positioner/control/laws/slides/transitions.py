@@ -23,6 +23,7 @@ from positioner.control.laws.slides.plan import Plan, shortest_seen_m
 from positioner.control.laws.slides.slide_memory import Excursions, Move, Row, SlideMemory, day_m
 from positioner.control.laws.slides.states import (
     STATES,
+    STUCK,
     Idle,
     Out,
     Presliding,
@@ -323,7 +324,7 @@ def _stuck_or_barred(memory: SlideMemory, now: Now, reason: InhibitReason) -> Sl
     return replace(
         memory,
         command_pa=now.bounds.allowed_pa(now.balance.slide_pa(rest_m, now.reference_m, s)),
-        state=Stuck(rest_m),
+        state=STUCK,
         move=replace(memory.move, left=0),
         distances=row.before,
         row=Row(row.before, stuck_at_m=rest_m),
