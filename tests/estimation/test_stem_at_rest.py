@@ -82,3 +82,28 @@ def test_nothing_rests_under_a_measured_pressure_that_moves() -> None:
 
 def test_a_long_rest_is_kept_in_a_bounded_memory() -> None:
     assert first_rest(np.full(20_000, 0.05)) is not None
+
+
+def short_of(path_m: np.ndarray) -> float:
+    """Return how far short of its balance a stem may have stuck, m, that went so from 0.05 m on and rests."""
+    window = RestWindow(STROKE_M)
+    window.restart(0.0)
+    for index, position_m in enumerate(np.append(0.05, 0.05 + path_m)):
+        window.add(index * PERIOD_S, position_m, np.nan)
+    assert window.rest is not None
+    return window.rest.short_m
+
+
+@pytest.mark.parametrize("left_m", [2e-4, 6e-4, 1.5e-3])
+def test_a_creep_that_stops_before_it_has_ended_says_by_how_much(left_m: float) -> None:
+    creep_m = 0.01 * (1 - np.exp(-np.arange(4000) * PERIOD_S / 0.3))
+    assert 0.5 * left_m < short_of(np.minimum(creep_m, 0.01 - left_m)) < 1.35 * left_m
+
+
+def test_a_creep_that_ends_by_itself_and_a_way_at_a_constant_rate_are_not_short() -> None:
+    assert short_of(0.01 * (1 - np.exp(-np.arange(6000) * PERIOD_S / 0.3))) < 2e-4 * STROKE_M
+    assert short_of(np.minimum(0.01 * np.arange(4000) * PERIOD_S, 0.01)) == 0.0
+
+
+def test_a_stem_that_goes_by_jumps_may_be_short_by_one() -> None:
+    assert short_of(1e-3 * np.floor(np.minimum(np.arange(4000) * PERIOD_S, 0.5) / 0.12)) == pytest.approx(1e-3, rel=0.3)

@@ -34,7 +34,6 @@ class _Slide(Schema):
     moved: bool
     landing: bool
     short_m: Length = 0.0
-    """Was kept once, and says nothing any more."""
     from_pa: Pressure | None = None
 
 
@@ -125,7 +124,7 @@ def _row(row: list[float]) -> Row:
 def _outcomes(slides: list[_Slide]) -> tuple[SlideOutcome, ...]:
     if any(each.direction not in (1, -1) for each in slides):
         raise ValueError("direction: must be 1 or -1")
-    return tuple(SlideOutcome(**each.model_dump(exclude={"short_m"})) for each in slides)
+    return tuple(SlideOutcome(**each.model_dump()) for each in slides)
 
 
 def _finite(each: SlideOutcome) -> bool:

@@ -71,6 +71,8 @@ class SlideOutcome(NamedTuple):
     moved: bool
     landing: bool
     """Whether the balance of the moving stem holds here."""
+    short_m: float = 0.0
+    """How far short of that balance it may have stuck behind a slow pressure: all slides alike, their mean too."""
     from_pa: float | None = None
     """Under which it rested before; None: it did not."""
 
@@ -308,6 +310,7 @@ class LandingDetector:
             std_m=hypot(rest.std_m, rest.crept_m, self.quantum_m / sqrt(12), CREEP * self._stroke_m * creep_s),
             moved=moved,
             landing=moved and self._free_m[0] < rest.position_m < self._free_m[1],
+            short_m=rest.short_m if moved else 0.0,
             from_pa=self._rested_pa,
         )
 

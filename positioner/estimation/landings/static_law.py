@@ -11,9 +11,9 @@ The residuals say how well the law holds: with n landings,
     cov θ = s^2 (X' W X)^-1,    deviations times t(n - 3) / 3
 
 which is the Cramér-Rao bound of white residuals, widened so that three deviations are 99.7 % for few landings, too.
-Where stems creep behind a slow pressure they all stick short of the balance (`landing_detector.CREEP`), and no residual
-shows it: the median m of how well a landing is known, of the direction in which it is more, is a deviation of the
-friction in either, however many landings:
+Where stems creep behind a slow pressure they all stick short of the balance (`stem_at_rest`), and no residual shows it:
+the median m of by how much they may, of the direction in which it is more, is a deviation of the friction in either,
+however many landings:
 
     var φ_up += (κ m)^2,   var φ_down += (κ m)^2
 A stem that swings past its balance has its landings on the law with their balances (`swing.py`).
@@ -174,7 +174,7 @@ def static_law(landings: Sequence[SlideOutcome], stroke_m: float) -> StaticLaw:
     scale = np.diag((1 / stroke_m, 1.0, 1.0))
     covariance = scale @ np.linalg.inv(X.T @ (weights[:, None] * X)) @ scale * (s * t_of_three_deviations(free)) ** 2
     slope, up_pa, down_pa = (scale @ theta).tolist()
-    covariance += np.diag((0.0, 1.0, 1.0)) * (slope * _creep_m(slides)) ** 2
+    covariance += np.diag((0.0, 1.0, 1.0)) * (slope * _short_m(slides)) ** 2
     std = np.sqrt(np.diag(covariance))
     reason = _refusal(slope, up_pa + down_pa, std, s, stroke_m)
     bent_pa = _bent_by_pa(Ratios.of(slope, up_pa, down_pa), balances, stroke_m)
@@ -189,9 +189,9 @@ def static_law(landings: Sequence[SlideOutcome], stroke_m: float) -> StaticLaw:
     )
 
 
-def _creep_m(slides: Sequence[SlideOutcome]) -> float:
-    """Return how far off their balances all slides alike may have come to rest, m."""
-    return max(median(each.std_m for each in slides if each.direction == s) for s in (1, -1))
+def _short_m(slides: Sequence[SlideOutcome]) -> float:
+    """Return how far short of their balances slides may have stuck, m."""
+    return max(median(each.short_m for each in slides if each.direction == s) for s in (1, -1))
 
 
 def _bent_by_pa(ratios: Ratios, slides: tuple[SlideOutcome, ...], stroke_m: float) -> float:

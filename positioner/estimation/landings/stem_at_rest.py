@@ -20,6 +20,15 @@ creeps evenly, by w_1 from T/4 to T/2 and by w_2 >= w_1/2 from T/2 to T, and tha
 
     w_2 <= a tenth of its way     no lag does that: while w_2 >= w_1/2 it goes 12 % of its way in w_2, or more
     w_2 <= v T/2                  v the speed that is no answer any more (landing_detector)
+
+How short of its balance may it rest? Friction rises as a stem that creeps behind a slow pressure comes to an end, and
+it sticks; or it goes by jumps. Neither shows where it rests, but in how abruptly it came there. With w_1 to w_4 the
+ways in the quarters of the time from a tenth of the way to T_s, a creep that stopped before its end was to go on by
+
+    w_4 r/(1 - r),   r = w_4/w_3      w_4 at the most, where it went by jumps, or was seen in few samples
+
+A pressure that comes at a constant rate has ended there: w_2, w_3 and w_4 are alike, no sample in them is a jump, and
+nothing is short. A creep of which no sample was seen cannot be judged.
 """
 
 from array import array
@@ -49,8 +58,14 @@ NOISIER, FEW = 2.0, 32
 """Factor on the noise of the rests before; rows in the second half that are few."""
 LONGEST_HIDDEN = 3.0
 """Of the time to come near: a creep hidden by noise is waited for no longer."""
+BEGUN = 0.1
+"""Of the way: a stem that went so far is under way."""
+ALIKE, A_JUMP = 0.25, 0.5
+"""Share of their mean by which quarters at a constant rate may differ; of a quarter's way: a sample that is a jump."""
 FEWEST_OF_A_LINE = 3
 """Samples that say how far a creep goes."""
+FEWEST_OF_A_CREEP = 6
+"""Samples from which r says something."""
 SLACKENS, OF_ITS_WAY = 0.5, 0.1
 """Of w_1, of the whole way: a stem that creeps goes on by at least, and at most, so much."""
 LOOKED_AGAIN = 1.1
@@ -70,6 +85,8 @@ class Rest:
     """Samples in the mean."""
     came_to_rest_s: float
     """When it was first seen there for good, after the change of the pressure."""
+    short_m: float = 0.0
+    """How far short of its balance it may have stuck."""
     crept_m: float = 0.0
     """How far it has crept towards it since a quarter of the time; it goes on."""
     pressure_pa: float = nan
@@ -189,6 +206,7 @@ class RestWindow:
             noise_m=noise_m * sqrt(self._each),
             count=late_m.size * self._each,
             came_to_rest_s=float(time_s[first]) if first else 0.0,
+            short_m=_short_m(time_s[: first + 1], position_m[: first + 1]),
             pressure_pa=late_pa,
         )
 
@@ -222,6 +240,24 @@ class RestWindow:
             came_to_rest_s=float(time_s[elsewhere[-1] + 1]) if elsewhere.size else 0.0,
             crept_m=abs(w_1) + abs(w_2),
         )
+
+
+def _short_m(time_s: Array, position_m: Array) -> float:
+    """Return how far short of its balance a stem may have stuck, m: by the samples until it had come to rest, (n,)."""
+    way_m = np.abs(position_m - position_m[0])
+    begun = int(np.argmax(way_m > BEGUN * way_m[-1]))
+    if way_m.size - begun < 2:
+        return 0.0
+    quarters_m = np.abs(np.diff(np.interp(np.linspace(time_s[begun - 1], time_s[-1], 5), time_s, position_m)))
+    _first, *later_m = quarters_m.tolist()
+    mean_m = sum(later_m) / len(later_m)
+    even = max(abs(each - mean_m) for each in later_m) <= ALIKE * mean_m
+    jump_m = float(np.abs(np.diff(position_m[begun + (way_m.size - begun) // 4 :])).max())
+    if even and jump_m <= A_JUMP * mean_m:
+        return 0.0
+    _second, third_m, last_m = later_m
+    few = way_m.size - begun < FEWEST_OF_A_CREEP
+    return float(last_m if few or third_m <= last_m else last_m * min(1.0, last_m / (third_m - last_m)))
 
 
 def _of_pairs(values: "array[float]") -> "array[float]":
