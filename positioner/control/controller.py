@@ -145,45 +145,30 @@ def first_memory(settings: Settings, held_pa: float, restored: ValveKnowledge | 
     if restored is not None:
         law = law.restored(restored)
         statics.restore(restored.landings, restored.held, restored.answers)
-    supervision, reference = SupervisionMemory(), Reference(0.0)
     nothing_yet = decision_of(
         command_pa=held_pa,
         state=S0,
-        mode=supervision.mode,
-        fault=supervision.fault,
+        mode=Mode.HOLD,
+        fault=NO_FAULT,
         inhibit_reason=InhibitReason.NOT_AUTOMATIC,
-        reference_m=reference.value_m,
-        delta_r_m=reference.delta_m,
-        sample_age_s=0.0,
+        reference_m=0.0,
+        delta_r_m=0.0,
         estimates=identification.estimates,
         progress=identification.estimates.progress,
         applied=settings.applied if restored is None else Applied(restored.ratios),
         static_law=statics.law,
         restoration=Restoration.of(restored, settings.valve),
-        experiment=PlayedExperiment(),
-        alarms=(),
-        measured=False,
-        cut_off=WITHIN,
         dead_band_m=settings.dead_band.fixed_m or 0.0,
-        one_direction=False,
     )
     return memory_of(
         last=nothing_yet,
         wanted_pa=held_pa,
         held_pa=held_pa,
-        supervision=supervision,
-        monitoring=MonitorMemory(),
-        reference=reference,
-        consumed=consumed_of(),
-        excitation=None,
-        identifying=False,
         law=law,
         path=long_held(held_pa) if settings.valve is not None and settings.valve.inverse.delays else None,
         course=OnCourse.begun(0.0, 0.0),
-        first_landing=0,
         identification=identification,
         statics=statics,
-        stands_for=None,
     )
 
 
@@ -335,7 +320,6 @@ def _decide_anew(
         first_landing=by_steps,
         identification=memory.identification,
         statics=memory.statics,
-        stands_for=None,
     )
 
 

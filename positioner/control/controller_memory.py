@@ -18,6 +18,7 @@ from positioner.control.requests import Requests
 from positioner.control.restoration import Restoration
 from positioner.control.supervision import SupervisionMemory
 from positioner.control.travel.course import OnCourse
+from positioner.control.travel.cutoffs import WITHIN
 from positioner.estimation.acceptance import Applied
 from positioner.estimation.estimates import Estimates
 from positioner.estimation.landings.static_identification import StaticIdentification
@@ -35,23 +36,23 @@ class Decision(NamedTuple):
     inhibit_reason: InhibitReason
     reference_m: float
     delta_r_m: float
-    sample_age_s: float
     estimates: Estimates
     progress: float
     """Of an identification, 0 to 1."""
     applied: Applied
     static_law: StaticLaw
     restoration: Restoration
-    experiment: PlayedExperiment
-    alarms: tuple[Fault, ...]
-    """Monitors whose condition holds for their delay, be they alarms or faults."""
-    measured: bool
-    """Whether there was a good measurement since the start."""
-    cut_off: int
-    """The stop onto which the stem is pressed, see `travel.cutoffs`."""
     dead_band_m: float
     """Error at rest that is left alone."""
-    one_direction: bool
+    sample_age_s: float = 0.0
+    experiment: PlayedExperiment = PlayedExperiment()
+    alarms: tuple[Fault, ...] = ()
+    """Monitors whose condition holds for their delay, be they alarms or faults."""
+    measured: bool = False
+    """Whether there was a good measurement since the start."""
+    cut_off: int = WITHIN
+    """The stop onto which the stem is pressed."""
+    one_direction: bool = False
     """Whether the law needs friction of a direction in which it is not known."""
 
 
@@ -74,22 +75,22 @@ class ControllerMemory(NamedTuple):
     """The pressure that the last command shall bring about: another, where it leads against a lag."""
     held_pa: float
     """What S0 holds, and what it gets back after S3."""
-    supervision: SupervisionMemory
-    monitoring: MonitorMemory
-    reference: Reference
-    consumed: ConsumedRequests
-    excitation: ActiveExcitation | None
-    identifying: bool
     law: Law
     path: PathMemory | None
     """None: nothing is known of a pressure that arrives late."""
     course: OnCourse
     """Of the reference in force to the one asked for."""
-    first_landing: int
-    """The direction in which the stem goes by steps to its first landing, 0: it does not; see `first_landing`."""
     identification: Identification
     statics: StaticIdentification
-    stands_for: Requests | None
+    supervision: SupervisionMemory = SupervisionMemory()
+    monitoring: MonitorMemory = MonitorMemory()
+    reference: Reference = Reference(0.0)
+    consumed: ConsumedRequests = ConsumedRequests()
+    excitation: ActiveExcitation | None = None
+    identifying: bool = False
+    first_landing: int = 0
+    """The direction in which the stem goes by steps to its first landing, 0: it does not; see `first_landing`."""
+    stands_for: Requests | None = None
     """The requests for which the last decision stands until something else is seen; None: each step decides anew."""
 
     def copied(self) -> "ControllerMemory":
