@@ -105,7 +105,7 @@ def _write_proposals(
     if file.law is not None and file.law.valve is not None:
         stays["law"] = "[law] stays: it names a valve file"
     if "maximum_pa" in file.pressure.model_fields_set:
-        stays["pressure"] = f"pressure.maximum_pa = {file.pressure.maximum_pa:.6g} stays: it is as somebody wrote it"
+        stays["pressure"] = f"pressure.maximum_pa = {file.pressure.maximum_pa:.6g} is kept as the file gives it"
     told = [each for each in proposals if each.table not in stays]
     print(f"\nfor {path}:")
     for line in (*(each.line for each in told), *stays.values()):
@@ -122,7 +122,7 @@ def _write_proposals(
         raise InputError(str(path), f"cannot be written: {error.strerror}") from None
     except InputError as error:
         replace_whole(path, before)
-        raise InputError(str(path), f"is as it was, for with what was found it is refused: {error}") from None
+        raise InputError(str(path), f"is unchanged: with what was found it would be refused: {error}") from None
     print(f"written; next: positioner doctor {path}, positioner run {path}")
     return 0
 

@@ -97,7 +97,7 @@ SLIDES = "slides"
 LARGEST_ERROR_PU = 0.01
 """By the paper."""
 LARGEST_SLIDES_ERROR_PU = 0.001  # of a step by slides
-BY_STEPS = ", the first move down: by steps, and left where it lands nearer than this law can move"
+BY_STEPS = ", the first move down: by steps, to where this law can move it no nearer"
 LARGEST_RATIO_ERROR = 0.01  # of b/c and k/c
 PAPER = "paper"
 """Beside `SLIDES`, the law of a daemon."""

@@ -94,7 +94,7 @@ def run(arguments: argparse.Namespace) -> int:
     write_json(arguments.out / "verdict.json", told.as_json(), indent=1)
     print(told.summary())
     if told.outcome == "budget_spent":
-        print(f"to play on: the same command with {arguments.out}/{EXPERIMENT.format('*')} among --rec")
+        print(f"to go on, give the same command with {arguments.out}/{EXPERIMENT.format('*')} among --rec")
     return 0 if told.outcome in ("resolved", "one_class") else 1
 
 

@@ -170,7 +170,7 @@ def _bus(file: "DaemonFile", _config: Path) -> str:
     position = file.valve.plain.said(reading.position_m, ".5f")
     seen = [f"position {position}, holds {held_pa:.0f} Pa, {1e3 * took_s:.2f} ms a reading"]
     if lost:
-        seen.append("one of them asked for twice, its reply was lost")
+        seen.append("one reading asked for again, because its reply was lost")
     if in_registers := travel_in_registers(file):
         seen.append(in_registers)
     return f"{', '.join(seen)}; but {said}" if said else ", ".join(seen)

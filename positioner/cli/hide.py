@@ -62,7 +62,7 @@ def run(arguments: argparse.Namespace) -> int:
 def _check(arguments: argparse.Namespace) -> None:
 
     if arguments.seed is None:
-        raise InputError("--seed", "is needed: a whole number, 0 or more, by which all is drawn")
+        raise InputError("--seed", "is needed: a whole number, 0 or more, the seed of the random valve")
     if arguments.seed < 0:
         raise InputError("--seed", f"must be a whole number, 0 or more, got {arguments.seed}")
     if arguments.out is None:
@@ -87,7 +87,7 @@ def _print_answer(sha256: str, answer: Mapping[str, Any]) -> None:
             f"and test.csv by {1e3 * seen['test_m']:.3g} mm"
         )
     floor = answer["floor_m"]
-    print(f"floor: {1e3 * floor['fit']:.3g} mm and {1e3 * floor['test']:.3g} mm rms, what the true valve itself misses")
+    print(f"floor: {1e3 * floor['fit']:.3g} mm and {1e3 * floor['test']:.3g} mm rms, the error of the true valve")
     print(f"valve: {_list_values(answer['valve'])}")
 
 

@@ -63,7 +63,7 @@ def _report(dcs: "Dcs", problem: str | None) -> int:
     if law["sampling"]:
         print(f"\n[device] sampling, as found: {Sampling(int(law['sampling'])).text}")
     if int(law["ne107_causes_high"]) >> (Ne107Cause.ONE_DIRECTION - 17) & 1:
-        print("\none direction is identified: k/c holds there alone until the stem has moved the other way")
+        print("\none direction is identified: k/c holds for it alone until the stem has moved the other way")
     print("\napplied. [memory] folder in the daemon's file keeps it over a restart; without it, copy:")
     print(f"[law]\nb_over_c_pa_per_m = {law['b_over_c_applied']:.7g}")
     print(f"k_over_c_pa = {law['k_over_c_applied']:.7g}")

@@ -53,10 +53,10 @@ def run(arguments: argparse.Namespace) -> int:
     sheet = {key: getattr(arguments, key) for key in SHEET}
     if arguments.of is not None:
         if given := [key for key, value in sheet.items() if value is not None]:
-            raise InputError(_option(given[0]), "is of a data sheet, so --of must not be given")
+            raise InputError(_option(given[0]), "describes a data sheet, so --of must not be given")
         return _change_file(arguments)
     if missing := [key for key in REQUIRED if sheet[key] is None]:
-        raise InputError(_option(missing[0]), "is needed of a data sheet; --of VALVE.toml changes another valve")
+        raise InputError(_option(missing[0]), "is needed for a data sheet; --of VALVE.toml changes another valve")
     if arguments.set or arguments.without:
         raise InputError("--set" if arguments.set else "--without", "needs --of VALVE.toml, the valve that is changed")
     return _from_data_sheet(arguments)
@@ -109,5 +109,5 @@ def _from_data_sheet(arguments: argparse.Namespace) -> int:
         print(f"from the data sheet: {each}")
     for each in assumed:
         print(f"assumed: {each}")
-    print(f"{arguments.out}: written; hold it against a recording: positioner compare REC --valve {arguments.out}")
+    print(f"{arguments.out}: written; compare it with a recording: positioner compare REC --valve {arguments.out}")
     return 0

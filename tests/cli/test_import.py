@@ -215,8 +215,8 @@ def test_a_data_sheet_that_cannot_be_is_one_line(
         (["--of", "seed", "--set", "coulomb_n=x"], "--set: must be NAME=VALUE, as coulomb_n=1300, got 'coulomb_n=x'"),
         (["--of", "seed", "--set", "coulomb=1"], "coulomb: is no parameter of the valve; allowed: mass_kg"),
         (["--of", "seed", "--without", "preload"], "preload: is no effect of the valve; allowed: none"),
-        (["--of", "seed", "--area-cm2", "7"], "--area-cm2: is of a data sheet, so --of must not be given"),
-        (["--set", "coulomb_n=1"], "--area-cm2: is needed of a data sheet; --of VALVE.toml changes another valve"),
+        (["--of", "seed", "--area-cm2", "7"], "--area-cm2: describes a data sheet, so --of must not be given"),
+        (["--set", "coulomb_n=1"], "--area-cm2: is needed for a data sheet; --of VALVE.toml changes another valve"),
     ],
 )
 def test_a_valve_that_cannot_be_made_of_another_is_one_line(

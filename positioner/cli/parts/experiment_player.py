@@ -119,7 +119,7 @@ class RunningValve:
         written_s = RECORDED_WITHIN_S if state.played else BROKEN_OFF_WITHIN_S
         recording = read_experiment_rows(self._folder, self._file.valve.name, points, before, written_s)
         if recording is None and not problem:
-            problem = f"what is recorded in {self._folder} is not the whole of it"
+            problem = f"the recording in {self._folder} is not complete"
         return Played(recording, state, problem)
 
 
