@@ -1,12 +1,11 @@
 """Friction against its baseline: a row a minute since this page looks, before that an hourly row of the history."""
 
 import time
-from typing import Any
 
 from nicegui import ui
 
 from northbound.observer.valve_view import ValveView
-from northbound.operator_page.marks import DASHES
+from northbound.operator_page.charts import Options, framed, line, quiet
 from webpage.theme import Theme
 from webpage.units import Units
 
@@ -38,28 +37,23 @@ class FrictionPlot:
         self._chart.set_visibility(True)
         self._chart.update()
 
-    def _options(self, rows: tuple[tuple[float, float, float], ...]) -> dict[str, Any]:
+    def _options(self, rows: tuple[tuple[float, float, float], ...]) -> Options:
         ink, unit = self._theme.ink, self._units.pressure
         wall_s = time.time() - time.monotonic()
-        quiet = {"axisLabel": {"color": ink.quiet}, "splitLine": {"lineStyle": {"color": ink.grid}}}
         styles = (("friction", ink.measured, "solid"), ("baseline", ink.model, "dashed"))
-        return {
-            "animation": False,
-            "legend": {"top": 0, "left": 0, **DASHES, "textStyle": {"color": ink.text}},
-            "tooltip": {"trigger": "axis", "backgroundColor": ink.paper, "textStyle": {"color": ink.text}},
-            "grid": {"left": 52, "right": 12, "top": 30, "bottom": 24},
-            "xAxis": {"type": "time", "splitNumber": 3, **quiet},
-            "yAxis": {"min": 0, "splitNumber": 3, **quiet},
-            "series": [
-                {
-                    "type": "line",
-                    "name": f"{name}, {unit.name}",
-                    "step": "end",
-                    "showSymbol": False,
-                    "lineStyle": {"color": colour, "type": line},
-                    "itemStyle": {"color": colour},
-                    "data": [[round(1e3 * (wall_s + row[0])), unit.per_si * row[column]] for row in rows],
-                }
-                for column, (name, colour, line) in enumerate(styles, start=1)
+        return framed(
+            ink,
+            grid={"left": 52, "right": 12, "top": 30, "bottom": 24},
+            xAxis=quiet(ink, type="time", splitNumber=3),
+            yAxis=quiet(ink, min=0, splitNumber=3),
+            series=[
+                line(
+                    colour,
+                    dash,
+                    name=f"{name}, {unit.name}",
+                    step="end",
+                    data=[[round(1e3 * (wall_s + row[0])), unit.per_si * row[column]] for row in rows],
+                )
+                for column, (name, colour, dash) in enumerate(styles, start=1)
             ],
-        }
+        )

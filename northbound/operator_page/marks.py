@@ -14,9 +14,6 @@ NE107_COLOURS = {
 }
 """Beside the words, which say it without any colour."""
 
-DASHES = {"itemWidth": 30, "itemStyle": {"opacity": 0}}
-"""Of a plot's legend: a line is drawn there as it is in the plot, dashed or not, and without a mark on it."""
-
 UNHEARD = (
     ".unheard { visibility: hidden; position: fixed; left: 16px; right: 16px; bottom: 16px; z-index: 9; }"
     + "".join(
@@ -81,10 +78,7 @@ class SignOfLife:
 
 def grey(element: ui.element, stale: bool) -> None:
     """Grey what is not of now, or take that back."""
-    if stale:
-        element.classes(add="stale")
-    else:
-        element.classes(remove="stale")
+    element.classes(**{"add" if stale else "remove": "stale"})
 
 
 def mark_ne107(label: ui.label, letter: str) -> None:
@@ -96,7 +90,4 @@ def mark_ne107(label: ui.label, letter: str) -> None:
 
 def mark_fault(label: ui.label, faulty: bool) -> None:
     """Mark a fault, or take that back."""
-    if faulty:
-        label.classes(add="faulty")
-    else:
-        label.classes(remove="faulty")
+    label.classes(**{"add" if faulty else "remove": "faulty"})

@@ -5,14 +5,13 @@ down to every sample that the daemon took.
 """
 
 import math
-from typing import Any
 
 import numpy as np
 from nicegui import events, ui
 
 from config.recording import Column, Recording
 from northbound.observer.trends import thin_columns
-from northbound.operator_page.marks import DASHES
+from northbound.operator_page.charts import Options, framed, line, quiet, titled
 from webpage.theme import Theme
 from webpage.units import Unit, Units
 
@@ -77,34 +76,20 @@ class RecordedPlot:
         rows: list[list[float]] = np.column_stack([np.round(part["time_s"] - time_s[-1], 5), *lines]).tolist()
         return rows
 
-    def _whole(self) -> dict[str, Any]:
+    def _whole(self) -> Options:
         ink, time_s = self._theme.ink, self._columns["time_s"]
-        quiet = {"axisLabel": {"color": ink.quiet}, "splitLine": {"lineStyle": {"color": ink.grid}}}
         ends = {"axisLabel": {"color": ink.quiet, "showMinLabel": False}, "axisLine": {"onZero": False}}
-        titled = {"nameTextStyle": {"color": ink.quiet, "align": "left", "padding": [0, 0, 0, -40]}, "nameGap": 8}
         zoom = {"xAxisIndex": 0, "filterMode": "none"}
-        return {
-            "animation": False,
-            "tooltip": {"trigger": "axis", "backgroundColor": ink.paper, "textStyle": {"color": ink.text}},
-            "legend": {"top": 0, "left": 0, **DASHES, "textStyle": {"color": ink.text}},
-            "grid": {"left": 52, "right": 12, "top": 52, "bottom": 64},
-            "dataset": {"source": self._rows(time_s[0], time_s[-1]), "sourceHeader": False},
-            "xAxis": {"type": "value", "min": float(time_s[0] - time_s[-1]), "max": 0, "name": "s", **quiet, **ends},
-            "yAxis": {"scale": True, "name": f"position, {self._unit.name}", **titled, **quiet, **ends},
-            "dataZoom": [{"type": "inside", **zoom}, {"type": "slider", "height": 20, "bottom": 8, **zoom}],
-            "series": [
-                {
-                    "type": "line",
-                    "name": name,
-                    "encode": {"x": 0, "y": number},
-                    "showSymbol": False,
-                    "step": "end" if dash == "dashed" else False,
-                    "z": 3 if dash == "dashed" else 2,
-                    "lineStyle": {"color": colour, "width": 1.5, "type": dash},
-                    "itemStyle": {"color": colour},
-                }
-                for number, (name, colour, dash) in enumerate(
-                    (("reference", ink.model, "dashed"), ("position", ink.measured, "solid")), start=1
-                )
+        drawn = (("reference", ink.model, "dashed"), ("position", ink.measured, "solid"))
+        return framed(
+            ink,
+            grid={"left": 52, "right": 12, "top": 52, "bottom": 64},
+            dataset={"source": self._rows(time_s[0], time_s[-1]), "sourceHeader": False},
+            xAxis=quiet(ink, type="value", min=float(time_s[0] - time_s[-1]), max=0, name="s", **ends),
+            yAxis=quiet(ink, scale=True, **titled(ink, f"position, {self._unit.name}"), **ends),
+            dataZoom=[{"type": "inside", **zoom}, {"type": "slider", "height": 20, "bottom": 8, **zoom}],
+            series=[
+                line(colour, dash, name=name, encode={"x": 0, "y": number})
+                for number, (name, colour, dash) in enumerate(drawn, start=1)
             ],
-        }
+        )

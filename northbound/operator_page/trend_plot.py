@@ -16,11 +16,9 @@ from config.codes import State
 from config.recording import Column
 from northbound.observer.trends import WAITING, bands, thin_columns
 from northbound.observer.valve_view import ValveView
-from northbound.operator_page.marks import DASHES
+from northbound.operator_page.charts import Options, framed, line, titled
 from webpage.theme import Theme
 from webpage.units import Unit, Units
-
-Options = dict[str, Any]
 
 WINDOWS_S = {"30 s": 30.0, "1 min": 60.0, "10 min": 600.0}
 MOST_STEPS = 400
@@ -152,59 +150,36 @@ class TrendPlot:
         places = ({"top": 58, "height": 200}, {"top": 284, "height": 120})
         units = (self._position_unit().name, self._units.pressure.name)
         series = [
-            {
-                "type": "line",
-                "xAxisIndex": each.panel,
-                "yAxisIndex": each.panel,
-                "encode": {"x": 0, "y": number},
-                "showSymbol": False,
-                "z": 2 if each.measured else 3,
-                "step": False if each.measured else "end",
-                "lineStyle": {"width": 1.8, "color": getattr(ink, each.ink), "type": each.dash},
-                "itemStyle": {"color": getattr(ink, each.ink)},
+            line(
+                getattr(ink, each.ink),
+                each.dash,
+                xAxisIndex=each.panel,
+                yAxisIndex=each.panel,
+                encode={"x": 0, "y": number},
                 **change,
-            }
+            )
             for number, (each, change) in enumerate(zip(LINES.values(), changing["series"], strict=True), start=1)
         ]
         for each in series:
             each["markArea"] |= {"silent": True, "label": {"color": ink.quiet, "position": "insideTop"}}
-        return {
-            "animation": False,
-            "textStyle": {"fontFamily": "inherit"},
-            "legend": {
-                "top": 0,
-                "left": 0,
-                **DASHES,
-                "textStyle": {"color": ink.text},
-                "data": list(LINES),
-            },
-            "tooltip": {"trigger": "axis", "backgroundColor": ink.paper, "textStyle": {"color": ink.text}},
-            "axisPointer": {"link": [{"xAxisIndex": "all"}]},
+        return framed(
+            ink,
+            axisPointer={"link": [{"xAxisIndex": "all"}]},
             # No room is made for labels at the right end: of a narrow page it would be the lower panel's alone.
-            "grid": [{"left": 52, "right": 24, "outerBoundsMode": "none", **place} for place in places],
-            "dataset": changing["dataset"],
-            "xAxis": [
+            grid=[{"left": 52, "right": 24, "outerBoundsMode": "none", **place} for place in places],
+            dataset=changing["dataset"],
+            xAxis=[
                 {"type": "time", "gridIndex": number, "splitNumber": 4, **(quiet if number else hidden), **x}
                 for number, x in enumerate(changing["xAxis"])
             ],
-            "yAxis": [
-                {
-                    "gridIndex": number,
-                    "name": f"{what}, {unit}",
-                    "nameTextStyle": {"color": ink.quiet, "align": "left", "padding": [0, 0, 0, -40]},
-                    "nameGap": 8,
-                    "splitNumber": 4,
-                    **quiet,
-                    **inner,
-                    **rule,
-                    **y,
-                }
+            yAxis=[
+                {"gridIndex": number, "splitNumber": 4, **titled(ink, f"{what}, {unit}"), **quiet, **inner, **rule, **y}
                 for number, (what, unit, y) in enumerate(
                     zip(("position", "pressure"), units, changing["yAxis"], strict=True)
                 )
             ],
-            "series": series,
-        }
+            series=series,
+        )
 
 
 def _range(drawn: Column, least: float) -> tuple[float | None, float | None]:
