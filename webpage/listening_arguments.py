@@ -1,6 +1,7 @@
-"""Where a command listens: `--listen-host` and `--listen-port` in every command that does."""
+"""Where a command listens: `--listen-host` and `--listen-port` in every command that does; what pages add to them."""
 
 import argparse
+from pathlib import Path
 from typing import TYPE_CHECKING
 
 from config.errors import InputError
@@ -16,6 +17,18 @@ def add_listening(parser: argparse.ArgumentParser, port: int | None = None) -> N
     parser.add_argument("--listen-host", default="127.0.0.1", help="address to listen on; this machine alone")
     free = " (8765, or a free one)" if port is None else ""
     parser.add_argument("--listen-port", type=int, default=port, metavar="N", help=f"port to listen on{free}")
+
+
+def add_page(parser: argparse.ArgumentParser) -> None:
+    """Declare where a page listens, who comes in, and whether a browser is opened."""
+    add_listening(parser)
+    parser.add_argument(
+        "--password-file",
+        type=Path,
+        metavar="FILE",
+        help="its first line is the password for everybody; needed with --listen-host",
+    )
+    parser.add_argument("--no-open", action="store_true", help="print the address only; open no browser")
 
 
 def listening(arguments: argparse.Namespace) -> "Listening":

@@ -7,7 +7,7 @@ from typing import TYPE_CHECKING
 
 from config.errors import InputError
 from northbound.served_valves import add_certificates, certificates, places_in, set_role_password
-from webpage.listening_arguments import add_listening, listening
+from webpage.listening_arguments import add_page, listening
 
 if TYPE_CHECKING:
     from northbound.observer.watched_valves import Place
@@ -35,14 +35,7 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
         choices=("operator", "engineer"),
         help="ask for the password of this role, write it to --roles, and end",
     )
-    add_listening(parser)
-    parser.add_argument(
-        "--password-file",
-        type=Path,
-        metavar="FILE",
-        help="its first line is the password for everybody; needed with --listen-host",
-    )
-    parser.add_argument("--no-open", action="store_true", help="print the address only; open no browser")
+    add_page(parser)
 
 
 def run(arguments: argparse.Namespace) -> int:

@@ -3,7 +3,7 @@
 import argparse
 from pathlib import Path
 
-from webpage.listening_arguments import add_listening, listening
+from webpage.listening_arguments import add_page, listening
 
 HELP = "open the workbench in a browser: compare, diagnose, add what is missing"
 EXAMPLE = "positioner workbench rec.csv --valve seed"
@@ -13,14 +13,7 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
     """Declare the command line."""
     parser.add_argument("recordings", type=Path, nargs="*", metavar="REC", help="recordings, or folders with some")
     parser.add_argument("--valve", metavar="VALVE.toml", help="a valve file, or a shipped valve's name")
-    add_listening(parser)
-    parser.add_argument(
-        "--password-file",
-        type=Path,
-        metavar="FILE",
-        help="its first line is the password for everybody; needed with --listen-host",
-    )
-    parser.add_argument("--no-open", action="store_true", help="print the address only; open no browser")
+    add_page(parser)
 
 
 def run(arguments: argparse.Namespace) -> int:
