@@ -60,7 +60,7 @@ LONGEST_HIDDEN = 3.0
 """Of the time to come near: a creep hidden by noise is waited for no longer."""
 BEGUN = 0.1
 """Of the way: a stem that went so far is under way."""
-ALIKE, A_JUMP = 0.25, 0.5
+QUARTERS_ALIKE, A_JUMP = 0.25, 0.5
 """Share of their mean by which quarters at a constant rate may differ; of a quarter's way: a sample that is a jump."""
 FEWEST_OF_A_LINE = 3
 """Samples that say how far a creep goes."""
@@ -251,7 +251,7 @@ def _short_m(time_s: Array, position_m: Array) -> float:
     quarters_m = np.abs(np.diff(np.interp(np.linspace(time_s[begun - 1], time_s[-1], 5), time_s, position_m)))
     _first, *later_m = quarters_m.tolist()
     mean_m = sum(later_m) / len(later_m)
-    even = max(abs(each - mean_m) for each in later_m) <= ALIKE * mean_m
+    even = max(abs(each - mean_m) for each in later_m) <= QUARTERS_ALIKE * mean_m
     jump_m = float(np.abs(np.diff(position_m[begun + (way_m.size - begun) // 4 :])).max())
     if even and jump_m <= A_JUMP * mean_m:
         return 0.0
