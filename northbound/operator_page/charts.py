@@ -10,7 +10,7 @@ DASHES = {"itemWidth": 30, "itemStyle": {"opacity": 0}}
 """Of a legend: a line is drawn there as it is in the plot, dashed or not, and without a mark on it."""
 
 
-def framed(ink: Ink, **options: Any) -> Options:
+def chart_options(ink: Ink, **options: Any) -> Options:
     """Return the options of a chart."""
     return {
         "animation": False,
@@ -26,7 +26,7 @@ def quiet(ink: Ink, **options: Any) -> Options:
     return {"axisLabel": {"color": ink.quiet}, "splitLine": {"lineStyle": {"color": ink.grid}}, **options}
 
 
-def titled(ink: Ink, name: str) -> Options:
+def axis_title(ink: Ink, name: str) -> Options:
     """Return how an axis is called, above its upper end."""
     style = {"color": ink.quiet, "align": "left", "padding": [0, 0, 0, -40]}
     return {"name": name, "nameTextStyle": style, "nameGap": 8}

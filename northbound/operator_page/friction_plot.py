@@ -5,7 +5,7 @@ import time
 from nicegui import ui
 
 from northbound.observer.valve_view import ValveView
-from northbound.operator_page.charts import Options, framed, line, quiet
+from northbound.operator_page.charts import Options, chart_options, line, quiet
 from webpage.theme import Theme
 from webpage.units import Units
 
@@ -41,7 +41,7 @@ class FrictionPlot:
         ink, unit = self._theme.ink, self._units.pressure
         wall_s = time.time() - time.monotonic()
         styles = (("friction", ink.measured, "solid"), ("baseline", ink.model, "dashed"))
-        return framed(
+        return chart_options(
             ink,
             grid={"left": 52, "right": 12, "top": 30, "bottom": 24},
             xAxis=quiet(ink, type="time", splitNumber=3),

@@ -11,7 +11,7 @@ from nicegui import events, ui
 
 from config.recording import Column, Recording
 from northbound.observer.trends import thin_columns
-from northbound.operator_page.charts import Options, framed, line, quiet, titled
+from northbound.operator_page.charts import Options, axis_title, chart_options, line, quiet
 from webpage.theme import Theme
 from webpage.units import Unit, Units
 
@@ -81,12 +81,12 @@ class RecordedPlot:
         ends = {"axisLabel": {"color": ink.quiet, "showMinLabel": False}, "axisLine": {"onZero": False}}
         zoom = {"xAxisIndex": 0, "filterMode": "none"}
         drawn = (("reference", ink.model, "dashed"), ("position", ink.measured, "solid"))
-        return framed(
+        return chart_options(
             ink,
             grid={"left": 52, "right": 12, "top": 52, "bottom": 64},
             dataset={"source": self._rows(time_s[0], time_s[-1]), "sourceHeader": False},
             xAxis=quiet(ink, type="value", min=float(time_s[0] - time_s[-1]), max=0, name="s", **ends),
-            yAxis=quiet(ink, scale=True, **titled(ink, f"position, {self._unit.name}"), **ends),
+            yAxis=quiet(ink, scale=True, **axis_title(ink, f"position, {self._unit.name}"), **ends),
             dataZoom=[{"type": "inside", **zoom}, {"type": "slider", "height": 20, "bottom": 8, **zoom}],
             series=[
                 line(colour, dash, name=name, encode={"x": 0, "y": number})

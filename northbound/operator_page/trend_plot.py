@@ -16,7 +16,7 @@ from config.codes import State
 from config.recording import Column
 from northbound.observer.trends import WAITING, bands, thin_columns
 from northbound.observer.valve_view import ValveView
-from northbound.operator_page.charts import Options, framed, line, titled
+from northbound.operator_page.charts import Options, axis_title, chart_options, line
 from webpage.theme import Theme
 from webpage.units import Unit, Units
 
@@ -162,7 +162,7 @@ class TrendPlot:
         ]
         for each in series:
             each["markArea"] |= {"silent": True, "label": {"color": ink.quiet, "position": "insideTop"}}
-        return framed(
+        return chart_options(
             ink,
             axisPointer={"link": [{"xAxisIndex": "all"}]},
             # No room is made for labels at the right end: of a narrow page it would be the lower panel's alone.
@@ -173,7 +173,15 @@ class TrendPlot:
                 for number, x in enumerate(changing["xAxis"])
             ],
             yAxis=[
-                {"gridIndex": number, "splitNumber": 4, **titled(ink, f"{what}, {unit}"), **quiet, **inner, **rule, **y}
+                {
+                    "gridIndex": number,
+                    "splitNumber": 4,
+                    **axis_title(ink, f"{what}, {unit}"),
+                    **quiet,
+                    **inner,
+                    **rule,
+                    **y,
+                }
                 for number, (what, unit, y) in enumerate(
                     zip(("position", "pressure"), units, changing["yAxis"], strict=True)
                 )
