@@ -6,10 +6,10 @@
 The plant is that of `tests/other_device.py`, 50 ms a cycle in virtual time, with 1 % noise of the stroke, or 12 bits.
 What is commissioned is unknown but for device and supply. Each line says how far figures are off. Friction is to be
 within 3 %, spring 1 %, bench set and seat load 2 %. The stem breaks loose at what it slides at; with --sticking at a
-third more. Then slow ramps show the mean of where it breaks loose and where it stops. It stops where the force falls
-below the least that any speed needs:
+third more. Then slow ramps show the mean of where it breaks loose, F_s, and where it stops. Its mass carries it beyond
+where the force falls below what its speed needs, so a slip is integrated from F = F_s, v = 0 until v = 0 again:
 
-    F = (F_s + min_v (g(v) + F_v v)) / 2        g(v) = F_c + (F_s - F_c) exp(-(v/v_s)^2)
+    m dv/dt = F - g(v) - F_v v,     dF/dt = -k v        g(v) = F_c + (F_s - F_c) exp(-(v/v_s)^2)
 
 With --wire the device is the server of another library (modbus-tk) on a clock of its own, 12 bits and mbar, without
 function 23: commissioned by the command, then served by a daemon, whose valve has its signature and partial strokes.
@@ -18,15 +18,17 @@ function 23: commissioned by the command, then served by a daemon, whose valve h
 import argparse
 from collections.abc import Callable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, replace
-from math import radians
+from math import exp, radians
 from pathlib import Path
 from tempfile import TemporaryDirectory
 
 import numpy as np
+from scipy.integrate import solve_ivp
 
 from config.codes import Mode
 from config.daemon_file import DaemonFile
 from config.drive import Kind
+from config.recording import Column
 from positioner.cli.main import main as cli
 from positioner.cli.parts.own_valve import unknown_travel
 from positioner.control.requests import ExperimentRequest, Requests
@@ -57,6 +59,9 @@ PERIOD_S = 0.05
 NOISE = 0.01
 """Of the stroke."""
 LIMIT_S = 300.0
+BROKEN_LOOSE = 1.001
+"""Of F_s: with F_s itself it would never go."""
+LONGEST_SLIP_S = 10.0
 ALLOWED: Mapping[str, float] = {
     "friction_pa": 0.03,
     "spring_pa_per_m": 0.01,
@@ -158,12 +163,28 @@ def found(variant: Variant, seed: int = 0) -> tuple[Outcome, Outcome]:
     return commissioned, signature(recordings, Nameplate("other", file.valve.stroke_m, kind=kind))
 
 
+def stops_at_n(parameters: Parameters) -> float:
+    """Return the force at which a slip ends, N."""
+    more_n = parameters.static_n - parameters.coulomb_n
+
+    def slip(_time_s: float, now: Column) -> list[float]:
+        force_n, v = now.tolist()
+        needed_n = parameters.coulomb_n + more_n * exp(-((v / parameters.stribeck_m_per_s) ** 2))
+        needed_n += parameters.viscous_ns_per_m * v
+        return [-parameters.spring_n_per_m * v, (force_n - needed_n) / parameters.mass_kg]
+
+    def stopped(_time_s: float, now: Column) -> float:
+        return float(now[1])
+
+    stopped.terminal, stopped.direction = True, -1.0  # type: ignore[attr-defined]
+    begun = [BROKEN_LOOSE * parameters.static_n, 0.0]
+    told = solve_ivp(slip, (0.0, LONGEST_SLIP_S), begun, "LSODA", events=stopped, rtol=1e-8, atol=1e-10)
+    return float(told.y[0, -1])
+
+
 def truth(parameters: Parameters) -> dict[str, float]:
     """Return what slow ramps are to show, SI."""
-    speeds = np.linspace(0.0, 10.0, 2001) * parameters.stribeck_m_per_s
-    more_n = (parameters.static_n - parameters.coulomb_n) * np.exp(-((speeds / parameters.stribeck_m_per_s) ** 2))
-    stops_at_n = float(np.min(parameters.coulomb_n + more_n + parameters.viscous_ns_per_m * speeds))
-    friction_n = 0.5 * (stops_at_n + parameters.static_n)
+    friction_n = 0.5 * (stops_at_n(parameters) + parameters.static_n)
     low_pa = parameters.preload_n / parameters.area_m2
     slope = parameters.spring_n_per_m / parameters.area_m2
     return {

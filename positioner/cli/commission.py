@@ -13,7 +13,7 @@ from positioner.cli.parts.breaking_off import end_as_by_ctrl_c
 from positioner.cli.parts.config_argument import add_config, config_file
 from positioner.cli.parts.output_files import write_json
 from positioner.cli.parts.own_valve import own_valve, unknown_travel
-from positioner.cli.parts.valve_test import kept
+from positioner.cli.parts.valve_test import KINDS, kept
 
 if TYPE_CHECKING:
     from config.daemon_file import DaemonFile
@@ -42,13 +42,12 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
     )
     parser.add_argument("--valve", dest="name", metavar="NAME", help="name of the valve, where the file has several")
     parser.add_argument("--yes", action="store_true", help="move the valve and write the result without a question")
-    parser.add_argument("--keep", choices=("factory", "as_found", "as_left"), help="keep the result under this name")
+    parser.add_argument("--keep", choices=KINDS, help="keep the result under this name")
     parser.add_argument("--json", type=Path, metavar="FILE", help="write verdict, figures and proposals as JSON")
 
 
 def run(arguments: argparse.Namespace) -> int:
     """Commission, print, ask, write; 0 if it came to a file, else 1."""
-
     from positioner.control.settings import Settings
     from positioner.tests_on_the_valve.commissioning import commission
 

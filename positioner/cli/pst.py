@@ -20,8 +20,6 @@ if TYPE_CHECKING:
 HELP = "test: a partial stroke, with break-out, friction and times against a reference (moves the valve)"
 EXAMPLE = "positioner pst site.toml --travel 0.1 --against as_left"
 
-DAYS_A_YEAR = 365.25  # Julian
-
 
 def add_arguments(parser: argparse.ArgumentParser) -> None:
     """Declare the command line."""
@@ -97,7 +95,7 @@ def _read_partial_stroke(arguments: argparse.Namespace, closes: bool) -> "Partia
 
 
 def _credit(arguments: argparse.Namespace) -> "Credit | None":
-    from positioner.tests_on_the_valve.credit import Credit
+    from positioner.tests_on_the_valve.credit import DAYS_A_YEAR, Credit
 
     if arguments.failure_rate_per_h is None:
         return None

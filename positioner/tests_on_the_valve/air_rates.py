@@ -5,12 +5,11 @@
 A booster, a restriction or a long tube shows as a rate below that of the command, which limits it otherwise.
 """
 
-from math import sqrt
-
 import numpy as np
 
 from config.recording import Column, Recording
 from positioner.response.figure import Figure, no_value
+from positioner.tests_on_the_valve.ramps import rate_of
 from positioner.tests_on_the_valve.thresholds import THRESHOLDS
 
 
@@ -33,9 +32,7 @@ def _rate(time_s: Column, rising_pa: Column, commanded_pa_per_s: float) -> Figur
     rows = max(onward, key=len, default=inside[:0])
     if len(rows) < THRESHOLDS.fewest_in_bin:
         return no_value("too few samples while it changes")
-    at_s, p = time_s[rows] - time_s[rows[0]], rising_pa[rows]
-    slope, level = np.polyfit(at_s, p, 1)
-    if slope > THRESHOLDS.as_commanded * commanded_pa_per_s:
+    rate, _ = rate_of(time_s[rows], rising_pa[rows])
+    if (rate.value or 0.0) > THRESHOLDS.as_commanded * commanded_pa_per_s:
         return no_value(f"as fast as the command, {1e-3 * commanded_pa_per_s:.4g} kPa/s")
-    left_pa = float(np.std(p - slope * at_s - level, ddof=2))
-    return Figure(float(slope), THRESHOLDS.sigmas * left_pa / (float(np.std(at_s)) * sqrt(len(p))))
+    return rate

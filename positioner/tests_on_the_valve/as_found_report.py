@@ -47,7 +47,7 @@ WIDTH, HEIGHT, EDGE = 640, 300, 56
 INKS = {"as_found": ("#d9622b", "#e8a27f"), "as_left": ("#1b7f79", "#7db8b4"), "factory": ("#5b6675", "#9aa4b1")}
 SIGNED = ("tested by", "date", "signature", "accepted by", "date", "signature")
 STYLE = """
-:root { --ink: #1f2a37; --quiet: #5b6675; --line: #dfe3e8; --good: #1b7f5c; --bad: #b4491b; }
+:root { --ink: #1f2a37; --quiet: #5b6675; --line: #dfe3e8; }
 body { margin: 0 auto; max-width: 980px; padding: 28px; color: var(--ink); font: 15px/1.5 system-ui, sans-serif; }
 h1 { font-size: 1.6rem; margin: 0 0 .2em; }
 h2 { font-size: 1.15rem; margin: 2em 0 .3em; border-top: 1px solid var(--line); padding-top: .7em; }
@@ -55,7 +55,7 @@ h2 { font-size: 1.15rem; margin: 2em 0 .3em; border-top: 1px solid var(--line); 
 table { border-collapse: collapse; width: 100%; font-size: .9rem; font-variant-numeric: tabular-nums; margin: .6em 0; }
 th, td { padding: 5px 10px; border-bottom: 1px solid var(--line); text-align: right; vertical-align: top; }
 th:first-child, td:first-child { text-align: left; } th { color: var(--quiet); font-weight: 600; }
-td.good { color: var(--good); } td.bad { color: var(--bad); font-weight: 600; } svg { max-width: 100%; height: auto; }
+svg { max-width: 100%; height: auto; }
 dl { display: grid; grid-template-columns: repeat(3, 1fr); gap: 30px 20px; margin-top: 2em; }
 dt { border-top: 1px solid var(--ink); color: var(--quiet); font-size: .85rem; padding-top: 4px; margin-top: 40px; }
 pre { font-size: .82rem; border: 1px solid var(--line); padding: 8px; overflow-x: auto; }
@@ -82,20 +82,16 @@ class ValveReport:
     @property
     def configuration(self) -> Mapping[str, Any]:
         """What was configured when the newest record was kept."""
-        return self.records[-1].configuration if self.records else {}
+        return self.records[-1].configuration
 
     def tests(self) -> list[str]:
         """Return the tests of which a record is kept as something, in the order they were first kept."""
         return list(dict.fromkeys(each.outcome.test for each in self.records if each.kind in KINDS))
 
-    def newest(self, test: str, kind: str) -> Record | None:
-        """Return the newest record of a test that is kept as a kind."""
-        found = [each for each in self.records if (each.outcome.test, each.kind) == (test, kind)]
-        return found[-1] if found else None
-
     def kept(self, test: str) -> dict[str, Record]:
         """Return the newest record of each kind, of a test."""
-        return {kind: each for kind in ("as_found", "as_left", "factory") if (each := self.newest(test, kind))}
+        newest = {each.kind: each for each in self.records if each.outcome.test == test}
+        return {kind: newest[kind] for kind in ("as_found", "as_left", "factory") if kind in newest}
 
     def table(self, test: str) -> Table:
         """Return a test's figures: what each should be, and what it was, by kind."""
@@ -190,8 +186,6 @@ def as_html(report: ValveReport) -> str:
         f"<section><h2>Configuration</h2><pre>{escape(_lines(report.configuration))}</pre></section>",
         "<section><h2>Signed</h2><dl>" + "".join(f"<div><dt>{each}</dt></div>" for each in SIGNED) + "</dl></section>",
     ]
-    if not report.tests():
-        parts.insert(1, "<p>No record is kept as found, as left or as the factory's: nothing to report.</p>")
     csp = "default-src 'none'; style-src 'unsafe-inline'"
     return (
         f'<!DOCTYPE html>\n<html lang="en"><head><meta charset="utf-8"><title>{escape(title)}</title>'

@@ -15,6 +15,7 @@ from numpy.typing import NDArray
 
 from config.recording import Column, Recording
 from positioner.response.figure import Figure, no_value
+from positioner.tests_on_the_valve.ramps import rate_of
 from positioner.tests_on_the_valve.thresholds import THRESHOLDS
 from signals.noise import quantum_m
 
@@ -100,8 +101,7 @@ def _rest(recording: Recording, first: int, last: int) -> Rest | None:
     x, t = recording.position_m[first:last], recording.time_s[first:last]
     if len(x) < THRESHOLDS.fewest_at_rest:
         return None
-    slope, level = np.polyfit(t - t[0], x, 1)
-    scatter = float(np.std(x - (slope * (t - t[0]) + level), ddof=2))
+    creep, scatter = rate_of(t, x)
     digit_m = quantum_m(recording.position_m)
     noise = max(scatter, digit_m / sqrt(12.0))
-    return Rest(float(np.mean(x)), noise, float(slope) * float(t[-1] - t[0]), digit_m, last - first)
+    return Rest(float(np.mean(x)), noise, (creep.value or 0.0) * float(t[-1] - t[0]), digit_m, last - first)

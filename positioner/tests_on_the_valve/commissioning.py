@@ -16,7 +16,7 @@ A reading that falls as the command rises is that of a valve which air closes, f
 
 from collections.abc import Callable
 from dataclasses import dataclass, replace
-from math import ceil, degrees, hypot, isfinite, sqrt
+from math import ceil, degrees, hypot, isfinite
 from typing import Protocol
 
 import numpy as np
@@ -30,6 +30,7 @@ from positioner.tests_on_the_valve import signature, small_steps
 from positioner.tests_on_the_valve.air_rates import air_rates
 from positioner.tests_on_the_valve.outcome import Outcome, Quantity, digits
 from positioner.tests_on_the_valve.program import Bounds, Leap, Player, Program, ramped
+from positioner.tests_on_the_valve.ramps import difference, rate_of, scaled
 from positioner.tests_on_the_valve.thresholds import THRESHOLDS
 from signals.noise import quantum_m
 
@@ -137,7 +138,9 @@ def _commissioned(valve: Watching, name: str, bounds: Bounds, show: Callable[[st
     action: ActionWord = "air_to_open" if sign > 0 else "air_to_close"
     opening, closing = (up_s, down_s) if sign > 0 else (down_s, up_s)
     closed_m = low.value if sign > 0 else -high.value
-    adequate, notes = _supply(found, bounds)
+    adequate, notes = _supply(found, bounds), []
+    if adequate.value is not None and adequate.value < THRESHOLDS.supply_margin:
+        notes.append("the supply is hardly enough to hold the stem at its upper end")
     if abs(closed_m) > THRESHOLDS.worth_of_span * travel.value:
         notes.append(
             f"the reading at the closed end is {kind.length.said(closed_m)}: its zero is off, set it in the device"
@@ -181,9 +184,9 @@ def _watched(recording: Recording | None) -> tuple[float, float, float]:
     """Return noise, digit and creep of the reading, m."""
     if recording is None or len(recording) < THRESHOLDS.fewest_at_rest:
         raise _Ended(ValveTestVerdict.UNDETERMINED, "no good measurement: positioner doctor says more")
-    x, t = recording.position_m, recording.time_s - recording.time_s[0]
-    slope, level = np.polyfit(t, x, 1)
-    return float(np.std(x - slope * t - level, ddof=2)), quantum_m(x) or 0.0, float(slope * t[-1])
+    x, t = recording.position_m, recording.time_s
+    creep, noise_m = rate_of(t, x)
+    return noise_m, quantum_m(x) or 0.0, (creep.value or 0.0) * float(t[-1] - t[0])
 
 
 def _played(valve: Watching, program: Program, show: Callable[[str], None]) -> Recording:
@@ -267,11 +270,9 @@ def _leak(recording: Recording, sign: float, digit_m: float) -> Figure:
     rows = rows[t[rows] >= t[rows[0]] + THRESHOLDS.settling_s]
     if len(rows) < THRESHOLDS.fewest_at_rest:
         return no_value("too few samples under the command held")
-    at_s, x = t[rows] - t[rows[0]], sign * recording.position_m[rows]
-    slope, level = np.polyfit(at_s, x, 1)
-    left_m = float(np.std(x - slope * at_s - level, ddof=2))
-    unseen_m_per_s = digit_m / float(at_s[-1])
-    return Figure(float(slope), max(THRESHOLDS.sigmas * left_m / (float(np.std(at_s)) * sqrt(len(x))), unseen_m_per_s))
+    creep, _ = rate_of(t[rows], sign * recording.position_m[rows])
+    unseen_m_per_s = digit_m / float(t[rows[-1]] - t[rows[0]])
+    return replace(creep, plus_minus=max(creep.plus_minus or 0.0, unseen_m_per_s))
 
 
 def _steps(
@@ -306,19 +307,14 @@ def of_one_that_sticks(friction: Figure, dead_band: Figure) -> Figure:
     return replace(friction, plus_minus=hypot(friction.plus_minus or 0.0, open_pa))
 
 
-def _supply(found: Outcome, bounds: Bounds) -> tuple[Figure, list[str]]:
-    """Return the commands above what takes the stem to its upper end, over the bench set's span; and what is wrong."""
-    low, high = (found.figure(each) for each in ("bench_low_pa", "bench_high_pa"))
-    friction = found.figure("friction_pa")
-    if low.value is None or high.value is None or friction.value is None:
-        return no_value("the bench set is not known"), []
-    span_pa = high.value - low.value
-    margin = (bounds.maximum_pa - high.value - friction.value) / span_pa
-    error = hypot(high.plus_minus or 0.0, friction.plus_minus or 0.0) / span_pa
-    notes = []
-    if margin < THRESHOLDS.supply_margin:
-        notes.append("the supply is hardly enough to hold the stem at its upper end")
-    return Figure(margin, error), notes
+def _supply(found: Outcome, bounds: Bounds) -> Figure:
+    """Return the commands above what takes the stem to its upper end, over the bench set's span."""
+    low, high, friction = (found.figure(each) for each in ("bench_low_pa", "bench_high_pa", "friction_pa"))
+    span = difference(high, low)
+    if span.value is None or friction.value is None:
+        return no_value("the bench set is not known")
+    needed = difference(high, scaled(friction, -1.0))
+    return scaled(difference(Figure(bounds.maximum_pa, 0.0), needed), 1.0 / span.value)
 
 
 def _proposals(outcome: Outcome, action: ActionWord, bounds: Bounds) -> list[Proposal]:

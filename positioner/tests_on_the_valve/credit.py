@@ -13,7 +13,9 @@ from dataclasses import dataclass
 
 from positioner.tests_on_the_valve.program import require_within
 
-HOURS_A_YEAR = 8766.0  # Julian
+DAYS_A_YEAR = 365.25
+HOURS_A_YEAR = 24.0 * DAYS_A_YEAR
+"""Julian."""
 LINEAR = 0.1
 """lambda T up to which the formula's linear form holds within 5 %."""
 ASSUMPTIONS = (
@@ -42,7 +44,7 @@ class Credit:
                 ("--failure-rate-per-h", self.rate_per_h, 1e-12, 1e-3),
                 ("--partial-coverage", self.partial_share, 0.0, self.proof_share),
                 ("--proof-coverage", self.proof_share, 0.0, 1.0),
-                ("--every-days", self.partial_y, 0.0, self.proof_y),
+                ("--every-days", DAYS_A_YEAR * self.partial_y, 0.0, DAYS_A_YEAR * self.proof_y),
                 ("--proof-every-years", self.proof_y, 0.0, self.life_y),
             ),
         )
@@ -66,8 +68,8 @@ class Credit:
         with_it, without = self.pfd_avg(tested=True), self.pfd_avg(tested=False)
         limits = "" if self.rate_per_h * HOURS_A_YEAR * self.life_y < LINEAR else " (upper bound: the rate is high)"
         return [
-            f"PFD_avg {with_it:.3g} with this test every {365.25 * self.partial_y:.0f} days, {without:.3g} without it"
-            f"{limits}",
+            f"PFD_avg {with_it:.3g} with this test every {DAYS_A_YEAR * self.partial_y:.0f} days, "
+            f"{without:.3g} without it{limits}",
             "by lambda/2 (C_p T_p + (C_f - C_p) T_f + (1 - C_f) T_l), "
             f"lambda {self.rate_per_h:g}/h, C_p {self.partial_share:g}, C_f {self.proof_share:g}, "
             f"T_f {self.proof_y:g} a, T_l {self.life_y:g} a",

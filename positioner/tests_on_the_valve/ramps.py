@@ -167,6 +167,14 @@ def scaled(figure: Figure, by: float) -> Figure:
     return difference(figure, Figure(0.0, 0.0), by)
 
 
+def rate_of(time_s: Column, x: Column) -> tuple[Figure, float]:
+    """Return how fast something changes, by its best line, and the standard deviation of what is left."""
+    at_s = time_s - time_s[0]
+    slope, level = np.polyfit(at_s, x, 1)
+    left = float(np.std(x - slope * at_s - level, ddof=2))
+    return Figure(float(slope), THRESHOLDS.sigmas * left / (float(np.std(at_s)) * sqrt(len(x)))), left
+
+
 def legs_of(recording: Recording) -> list[Leg]:
     """Return the legs of a recording; rows without a position or a command are left out."""
     whole = np.isfinite(recording.position_m) & np.isfinite(recording.command_pa)

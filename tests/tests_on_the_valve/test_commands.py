@@ -5,8 +5,11 @@ from pathlib import Path
 
 import pytest
 
+from config.codes import ExperimentState
+from config.errors import CommandFailed
 from config.slave_file import Initial
 from positioner.cli.main import main
+from positioner.cli.parts.valve_test import recordings_of
 from positioner.history.kept_tests import folder_of
 from positioner.tests_on_the_valve.kept_records import Record, records
 from positioner.tests_on_the_valve.program import Played, Program
@@ -90,6 +93,8 @@ def test_a_partial_stroke_is_kept_trended_and_may_claim_its_credit(
     assert found["figures"]["reached_m"]["plus_minus"] is not None
     assert main(["pst", str(site), "--travel", "0.9"]) == 2
     assert "--travel: allowed is 0.01 to 0.5 of the stroke, got 0.9" in capsys.readouterr().err
+    assert main(["pst", str(site), "--failure-rate-per-h", "1e-6", "--every-days", "4000"]) == 2
+    assert "--every-days: allowed is 0 to 1826.25, got 4000" in capsys.readouterr().err
 
 
 def test_one_that_is_broken_off_by_ctrl_c_is_kept_as_no_reference(site: Path, monkeypatch: pytest.MonkeyPatch) -> None:
@@ -128,3 +133,16 @@ def test_a_continuous_stroke_that_has_no_time_to_break_the_stem_loose_is_refused
 def test_steps_of_a_stem_at_its_end_are_refused(site: Path, capsys: pytest.CaptureFixture[str]) -> None:
     assert main(["steps", str(site)]) == 1
     assert "the stem is at an end, where steps move nothing" in capsys.readouterr().err
+
+
+@pytest.mark.parametrize(
+    ("state", "left"),
+    [
+        (ExperimentState.VETOED, "the law commands the valve again"),
+        (ExperimentState.FAULT, "the action of the fault commands the valve"),
+        (ExperimentState.NOT_AUTOMATIC, "the command before is held"),
+    ],
+)
+def test_what_has_the_valve_after_a_test_that_was_broken_off_is_said(state: ExperimentState, left: str) -> None:
+    with pytest.raises(CommandFailed, match=f"; {left}$"):
+        recordings_of([Played(None, state, state.text)])

@@ -9,7 +9,7 @@ from dataclasses import replace
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
-from config.codes import ValveTestVerdict
+from config.codes import ExperimentState, ValveTestVerdict
 from config.drive import Kind, as_written
 from config.errors import CommandFailed, InputError
 from config.results.block import as_text
@@ -29,6 +29,13 @@ if TYPE_CHECKING:
 KINDS = ("factory", "as_found", "as_left")
 """As `positioner.tests_on_the_valve.kept_records.KINDS`, which is not loaded for `--help`."""
 WINDOW_NEEDED = "experiment.travel_window: a {} goes over the whole travel, allowed is [0, 1], got [{:g}, {:g}]"
+
+
+LEFT_WITH = {
+    ExperimentState.FAULT: "the action of the fault commands the valve",
+    ExperimentState.NOT_AUTOMATIC: "the command before is held",
+}
+"""What has the valve after a test that did not come to its end, where that is not the law."""
 
 
 def add_test_arguments(parser: argparse.ArgumentParser, *, recordings: bool = True) -> None:
@@ -100,7 +107,6 @@ def require_whole_travel(file: "DaemonFile", test: str, config: Path) -> None:
     Raises:
         InputError: says what to write.
     """
-
     low, high = file.experiment.travel_window
     if low > 0.0 or high < 1.0:
         raise InputError(str(config), WINDOW_NEEDED.format(test, low, high))
@@ -108,7 +114,6 @@ def require_whole_travel(file: "DaemonFile", test: str, config: Path) -> None:
 
 def played_all(player: "Player", programs: "tuple[Program, ...]") -> "list[Played]":
     """Play programs one after another until one does not come to its end; say what goes on."""
-
     played = []
     for number, program in enumerate(programs, start=1):
         of = f"{number} of {len(programs)}"
@@ -163,10 +168,10 @@ def recordings_of(played: "list[Played]") -> "list[Recording]":
     Raises:
         CommandFailed: something was broken off; says by what.
     """
-
     for each in played:
         if each.problem or each.recording is None:
-            raise CommandFailed(f"broken off: {each.problem or each.state.text}; the law commands the valve again")
+            left = LEFT_WITH.get(each.state, "the law commands the valve again")
+            raise CommandFailed(f"broken off: {each.problem or each.state.text}; {left}")
     return [each.recording for each in played if each.recording is not None]
 
 
@@ -202,7 +207,6 @@ def finished(
 
 
 def _compared(outcome: "Outcome", before: "Record | None") -> "tuple[Outcome, list[Any]]":
-
     from positioner.tests_on_the_valve.kept_records import change_table, changes, meaning_table
 
     if before is None:
@@ -221,7 +225,6 @@ def _compared(outcome: "Outcome", before: "Record | None") -> "tuple[Outcome, li
 
 def kept(outcome: "Outcome", file: "DaemonFile", arguments: argparse.Namespace, kind: str) -> Path:
     """Keep an outcome as a kind, with what was configured, and return its file."""
-
     from positioner.history.kept_tests import records_folder
     from positioner.tests_on_the_valve.kept_records import keep
 
@@ -237,7 +240,6 @@ def configured(file: "DaemonFile") -> dict[str, Any]:
 
 
 def _as_written(kind: Kind, table: Any) -> Any:
-
     if not isinstance(table, dict):
         return table
     told = (as_written(kind, key, value) for key, value in table.items())
@@ -250,7 +252,6 @@ def draw(outcome: "Outcome", path: Path) -> None:
     Raises:
         InputError: it cannot be written, or it is named as no picture is.
     """
-
     try:
         outcome.plot().savefig(path)
     except (OSError, ValueError) as error:
