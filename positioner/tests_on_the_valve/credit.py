@@ -13,9 +13,8 @@ from dataclasses import dataclass
 
 from positioner.tests_on_the_valve.program import require_within
 
-DAYS_A_YEAR = 365.25
+DAYS_A_YEAR = 365.25  # Julian
 HOURS_A_YEAR = 24.0 * DAYS_A_YEAR
-"""Julian."""
 LINEAR = 0.1
 """lambda T up to which the formula's linear form holds within 5 %."""
 ASSUMPTIONS = (
