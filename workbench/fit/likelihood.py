@@ -20,6 +20,7 @@ nothing in it asks whether a slip happened.
 
 from collections.abc import Sequence
 from dataclasses import dataclass
+from functools import lru_cache
 from typing import NamedTuple
 
 import numpy as np
@@ -30,7 +31,7 @@ from sim.karnopp import Vector
 from workbench.data.record import Record
 from workbench.model.parameters import Parameter
 from workbench.model.sampling import Sampling
-from workbench.model.told_run import ToldMove, ToldPath, ToldRun
+from workbench.model.told_run import RECORDS, ToldMove, ToldPath, ToldRun
 
 Rows = npt.NDArray[np.int64]
 
@@ -90,10 +91,17 @@ class Layout:
     """Samples of each rest."""
     rest_after: Rows
     """The rest that each move ends in, (moves,); -1: none that is judged."""
+    in_motion: tuple[tuple[int, int], ...]
+    """Which of the residuals in motion belong to each move, first to end (half open)."""
+    broken: Rows
+    """Moves that break loose from a rest."""
+    move_of: Rows
+    """The move whose onset each residual hangs on, (rows,); the number of moves: none."""
 
 
-def layout(record: Record, told: Sequence[ToldMove], weights: Weights = WEIGHTS) -> Layout:
-    """Return the layout of a record: what is not in a move is at rest."""
+@lru_cache(maxsize=RECORDS)
+def layout(record: Record, told: tuple[ToldMove, ...], weights: Weights = WEIGHTS) -> Layout:
+    """Return the layout of a record, the same for every model: what is not in a move is at rest."""
     state = np.full(len(record), -2, dtype=np.int64)  # -2 not judged, -1 moving, k in the k-th rest
     rests, after = 0, np.zeros(len(told), dtype=np.int64)
     for number, (first, end) in enumerate(record.segments):
@@ -113,14 +121,29 @@ def layout(record: Record, told: Sequence[ToldMove], weights: Weights = WEIGHTS)
     starts = np.flatnonzero(within % weights.block == 0)
     count = np.diff(np.append(starts, resting.size))
     at = {int(name): i for i, name in enumerate(names)}
+    moving, rest_of = np.flatnonzero(state == -1), of[starts]
+    rest_after = np.array([at.get(int(each), -1) for each in after], dtype=np.int64)
+    in_motion = tuple(
+        (int(np.searchsorted(moving, first_in_motion(each))), int(np.searchsorted(moving, last_in_motion(each) + 1)))
+        for each in told
+    )
+    broken = np.array([k for k, each in enumerate(told) if not each.begins_in_motion], dtype=np.int64)
+    of_moving = np.full(moving.size, len(told), dtype=np.int64)
+    for k, (first, end) in enumerate(in_motion):
+        of_moving[first:end] = k
+    of_rests = np.full(names.size, len(told), dtype=np.int64)
+    of_rests[rest_after[rest_after >= 0]] = np.flatnonzero(rest_after >= 0)
     return Layout(
-        moving=np.flatnonzero(state == -1),
+        moving=moving,
         resting=resting,
         starts=starts,
         count=count,
-        rest_of=of[starts],
+        rest_of=rest_of,
         per_rest=np.bincount(of, minlength=names.size),
-        rest_after=np.array([at.get(int(each), -1) for each in after], dtype=np.int64),
+        rest_after=rest_after,
+        in_motion=in_motion,
+        broken=broken,
+        move_of=np.concatenate([of_moving, of_rests, of_rests[rest_of], broken]),
     )
 
 
@@ -132,15 +155,6 @@ def first_in_motion(move: ToldMove, weights: Weights = WEIGHTS) -> int:
 def last_in_motion(move: ToldMove, weights: Weights = WEIGHTS) -> int:
     """Return the last row of a move that counts by itself."""
     return min(move.after + weights.beside, move.until) - 1
-
-
-def motion_rows(like: "Likelihood") -> list[tuple[int, int]]:
-    """Return which of the residuals in motion belong to each move, first to end (half open)."""
-    moving = like.layout.moving
-    return [
-        (int(np.searchsorted(moving, first_in_motion(each))), int(np.searchsorted(moving, last_in_motion(each) + 1)))
-        for each in like.moves
-    ]
 
 
 class Likelihood:
@@ -165,24 +179,11 @@ class Likelihood:
         self.composition, self.record, self.parameters, self.weights = composition, record, tuple(parameters), weights
         self.by, self.from_pressure, self.load_n = by, from_pressure, load_n
         self.run = ToldRun(composition, record, tuple(told), by=by, from_pressure=from_pressure)
-        self.layout = layout(record, told, weights)
+        self.layout = layout(record, self.run.moves, weights)
         self.sigma_m = record.scale_m
         self.landing_m = self.sigma_m * np.sqrt(1.0 / self.layout.per_rest + weights.landing**2)
         self._last: tuple[bytes, Groups] | None = None
         self._quantum = next((i for i, each in enumerate(_guesses(composition)) if each == "quantum"), None)
-        self.broken = np.array([k for k, each in enumerate(told) if not each.begins_in_motion], dtype=np.int64)
-        self.move_of = self._move_of()
-        """The move whose onset each residual hangs on, (rows,); the number of moves: none."""
-
-    def _move_of(self) -> Rows:
-        none, rows = len(self.moves), self.layout
-        moving = np.full(rows.moving.size, none, dtype=np.int64)
-        for k, (first, end) in enumerate(motion_rows(self)):
-            moving[first:end] = k
-        resting = np.full(rows.per_rest.size, none, dtype=np.int64)
-        judged = rows.rest_after >= 0
-        resting[rows.rest_after[judged]] = np.flatnonzero(judged)
-        return np.concatenate([moving, resting, resting[rows.rest_of], self.broken])
 
     @property
     def moves(self) -> tuple[ToldMove, ...]:
@@ -190,10 +191,19 @@ class Likelihood:
         return self.run.moves
 
     @property
+    def broken(self) -> Rows:
+        """Which of these break loose from a rest."""
+        return self.layout.broken
+
+    @property
+    def move_of(self) -> Rows:
+        """As `Layout`."""
+        return self.layout.move_of
+
+    @property
     def count(self) -> int:
         """Residuals."""
-        sizes = self.layout.moving.size, self.layout.per_rest.size, self.layout.starts.size, self.broken.size
-        return int(sum(sizes))
+        return self.move_of.size
 
     def theta(self, z: Vector) -> Vector:
         """Return the parameter vector of coordinates, (parameters,)."""

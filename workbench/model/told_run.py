@@ -158,15 +158,17 @@ class ToldRun:
 
     def _held(self, part: "_Part", onsets_s: Vector) -> Vector:
         """Return the share of each period for which the stem is held."""
-        held = np.ones(part.starts_s.size - 1)
+        periods = part.starts_s.size - 1
         onset_s = onsets_s[part.first : part.end][part.let_go]
-        at = np.clip(np.searchsorted(part.starts_s, onset_s, side="right") - 1, 0, held.size - 1)
+        at = np.maximum(np.minimum(np.searchsorted(part.starts_s, onset_s, side="right") - 1, periods - 1), 0)
         begins = part.begins.copy()
         begins[part.let_go] = at + 1
-        for begin, over in zip(begins.tolist(), part.overs.tolist(), strict=True):
-            held[begin:over] = 0.0
+        loose = np.bincount(begins, minlength=periods + 1) - np.bincount(
+            np.maximum(part.overs, begins), minlength=periods + 1
+        )
+        held = (np.cumsum(loose)[:-1] == 0).astype(np.float64)
         begin_s, end_s = part.starts_s[at], part.starts_s[at + 1]
-        held[at] = np.clip((onset_s - begin_s) / (end_s - begin_s), 0.0, 1.0)
+        held[at] = np.maximum(np.minimum((onset_s - begin_s) / (end_s - begin_s), 1.0), 0.0)
         return held
 
 

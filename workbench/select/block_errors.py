@@ -26,7 +26,7 @@ from sim.karnopp import Vector
 from workbench.data.held_out import HELD_OUT_RECORDING, Part, Split, residual_m
 from workbench.fit.fit_result import Fit, Terms, terms
 from workbench.fit.fitting import COARSE_ROUNDS, at_the_noise, problem_of
-from workbench.fit.likelihood import Groups, Likelihood, Rows, motion_rows
+from workbench.fit.likelihood import Groups, Likelihood, Rows
 from workbench.fit.minimiser import descend
 from workbench.fit.onsets import with_onsets
 from workbench.fit.uncertainty import FARTHEST
@@ -221,7 +221,7 @@ def _of_counted(like: Likelihood, groups: Groups, part: Part) -> tuple[Groups, R
         return groups, like.layout.rest_of
     moves = [k for k, counts in enumerate(counted) if counts]
     rests = [like.layout.rest_after[k] for k in moves if like.layout.rest_after[k] >= 0]
-    rows, blocks = motion_rows(like), np.isin(like.layout.rest_of, rests)
+    rows, blocks = like.layout.in_motion, np.isin(like.layout.rest_of, rests)
     found = Groups(
         np.concatenate([np.empty(0), *(groups.motion[slice(*rows[k])] for k in moves)]),
         groups.landings[rests],
@@ -248,7 +248,7 @@ def _logs(like: Likelihood, groups: Groups, part: Part) -> Column:
     counted, found = _counted(like, part), []
     blocks = np.bincount(like.layout.rest_of, groups.rests**2, like.layout.per_rest.size)
     per_rest = np.maximum(np.bincount(like.layout.rest_of, minlength=like.layout.per_rest.size), 1)
-    for k, (first, end) in enumerate(motion_rows(like)):
+    for k, (first, end) in enumerate(like.layout.in_motion):
         if not counted[k]:
             continue
         squares = [float(np.mean(groups.motion[first:end] ** 2))] if end > first else []

@@ -9,6 +9,7 @@ The fifths are whole stretches of time. The residual is clipped at 5 of its robu
 is not the whole of it. On noise R^2 is 0 or less.
 """
 
+from functools import lru_cache
 from itertools import combinations_with_replacement
 
 import numpy as np
@@ -29,6 +30,8 @@ SURELY = 10.0
 """Odds of 150 to 1."""
 CLIPPED = 5.0
 FEWEST_ROWS = 100
+RECORDS = 4
+"""Whose states are kept: what was fitted and what was held out, of two diagnoses."""
 
 Matrix = npt.NDArray[np.float64]
 
@@ -81,8 +84,9 @@ def _regressors(record: Record, rows: npt.NDArray[np.intp]) -> Matrix:
     return found
 
 
+@lru_cache(maxsize=RECORDS)
 def _state(record: Record) -> Matrix:
-    """Return the standardised state, (n, 6)."""
+    """Return the standardised state, (n, 6): the record's own, for every model held against it."""
     state = np.zeros((len(record), 6), order="F")
     for first, end in record.segments:
         part = slice(first, end)
@@ -95,6 +99,7 @@ def _state(record: Record) -> Matrix:
         state[part] = np.column_stack([position_m, velocity, way[last], record.command_pa[part], change, time_s])
     for column in range(state.shape[1]):
         state[:, column] = _standard(np.nan_to_num(state[:, column]))
+    state.setflags(write=False)
     return state
 
 

@@ -14,12 +14,12 @@ from dataclasses import dataclass
 import numpy as np
 import numpy.typing as npt
 
-from config.valve_file import EffectTable, ValveFile
 from sim.composition import Composition
 from sim.effect import Effect
 from workbench.fit.breaking_off import go_on
 from workbench.fit.fit_result import Fit
-from workbench.fit.likelihood import Groups, soft_weight
+from workbench.fit.fitting import extended
+from workbench.fit.likelihood import Groups, Likelihood, soft_weight
 from workbench.fit.minimiser import derivatives
 from workbench.fit.problem import Problem
 from workbench.fit.threads import on_threads
@@ -67,19 +67,20 @@ class Tangents:
 
         Where slides end hangs on forces alone: it tells a place from another where the motion is far off.
         """
-        found = [self._with(effect, values) for values in points]
+        composition = extended(self._base.valve, (effect.written,), self._base.valve.valve)
+        like = self._of.likelihood(composition, ())
+        found = [self._with(like, values) for values in points]
         return (
             [self._all.score(each.whole - self._bare.whole) for each in found],
             [self._landings.score(each.landings - self._bare.landings) for each in found],
         )
 
-    def _with(self, effect: Effect, values: tuple[float, ...]) -> Groups:
-        """Return the residuals with an effect."""
+    def _with(self, like: Likelihood, values: tuple[float, ...]) -> Groups:
+        """Return the residuals with an effect's parameters, the last of a valve's, at these values."""
         go_on()
-        valve, named = self._base.valve, dict(zip(effect.parameters, values, strict=True))
-        table = EffectTable.model_validate({"name": effect.written, **named})
-        composition = Composition.from_file(ValveFile(valve=valve.valve, effect=(*valve.effect, table)))
-        return self._of.likelihood(composition, ()).at(composition.theta, self._base.onsets_s)
+        theta = like.composition.theta.copy()
+        theta[theta.size - len(values) :] = values
+        return like.at(theta, self._base.onsets_s)
 
 
 class _Projection:
