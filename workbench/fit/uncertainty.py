@@ -3,32 +3,40 @@
     H = J' W^3 J + 1 / f^2   J the residuals by coordinates z and onsets, W = 1 / sqrt(1 + (r / s)^2): the
                              soft L1 has the slope W r and the curvature W^3; f = `FARTHEST`, the deviation of what
                              no residual hangs on
-    M = sum_k g_k g_k'       g_k = J_k' W_k r_k of the k-th move and the rest that it ends in: these hang together
-    C = H^-1 (H + (n / (n - p)) M) H^-1 / 2,  but no less than H^-1, for n moves and p parameters
+    C = H^-1, but no less in any coordinate than (n - 1) / n sum_k d_k d_k'
+    d_k = (A - A_k)^-1 g_k   by how much the coordinates move without the k-th of n moves and the rest that it ends in;
+                             A = sum_k A_k curvature by coordinates, onsets eliminated, g_k = J_k' W_k r_k
 
-H^-1 is right where the residuals are the noise; the sandwich H^-1 M H^-1 (Huber, White, by clusters) where landings
-scatter by themselves, and every move is but one witness. An interval is z +- t sqrt C, t Student's of n - p degrees of
-freedom, and reaches over those of other ends that are nearly as likely (`ends`). Static friction is what break-aways
-leave open: its interval reaches over all values whose cost is within 1.92 of the least, by break-aways alone, and over
-that of the curvature, where this determines it. A load at an onset is known as well as that onset,
+H^-1 is right where the residuals are the noise; the jackknife by moves (Tukey) where landings scatter by
+themselves, and every move is but one witness. An interval is z +- t sqrt C, t Student's of n - p degrees of freedom. It
+reaches over those of other ends that are nearly as likely (`ends`).
+
+Static friction is what break-aways leave open. Their interval reaches over all values whose cost, by break-aways alone,
+is within 1.92 of the least; farther by what it changes, in squares, 1.96 deviations along each principal direction of
+the other coordinates; and over that of the curvature, where this determines it. A load at an onset is known as well as
+that onset,
 
     r_k / sqrt(1 + (dr_k / do_k)^2 / D_k)     D_k the curvature by the k-th onset
+
+Where break-aways scatter, s^2 = 2 cost / (n - 1) > 1, a force that no record holds breaks the stem loose, which it does
+early alone: the upper end goes up by its deviation, sqrt(s^2 - 1) L_0.
 
 A combination of parameters whose standard deviation exceeds 1, a factor of e, is not determined.
 """
 
 from collections.abc import Callable
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from math import exp
 
 import numpy as np
 from scipy.special import stdtrit
 
-from sim.composition import STATIC
+from sim.composition import COULOMB, STATIC
 from sim.karnopp import Vector
-from workbench.fit.likelihood import Likelihood, soft, soft_weight
-from workbench.fit.minimiser import End
+from workbench.fit.likelihood import Likelihood, by_move, soft, soft_weight
+from workbench.fit.minimiser import NO_SLOPE, End
 from workbench.fit.onsets import SHIFT
+from workbench.model.told_run import ToldPath
 
 PROBABILITY = 0.975
 """Of Student's t below the upper end of an interval of 95 %."""
@@ -114,38 +122,73 @@ def _curvature(like: Likelihood, end: End) -> Curvature:
     values, vectors = np.linalg.eigh(H)
     values = np.maximum(values, NOTHING * values[-1])
     inverse = (vectors / values) @ vectors.T
-    scores = np.zeros((len(like.moves) + 1, scaled.shape[1]))  # the last: what belongs to no move
-    np.add.at(scores, like.move_of, (weight * r)[:, None] * scaled)
-    scores = scores[:-1]
-    free = max(float(len(scores)) - count, FEWEST_FREE)
-    sandwich = np.diag(inverse @ (scores.T @ scores * (len(scores) / free)) @ inverse)
-    variance = np.maximum(np.diag(inverse), sandwich) / scale**2
-    std = np.minimum(np.sqrt(variance), FARTHEST)[:count]
-    reach = np.where(sandwich > np.diag(inverse), stdtrit(free, PROBABILITY), NORMAL_QUANTILE)[:count] * std
+    without = _without_each_move(like, scaled, weight, r, count, (FARTHEST * scale[:count]) ** -2.0)
+    moves = len(without)
+    apart = (moves - 1.0) / moves * np.sum(without**2, axis=0)
+    own = np.diag(inverse)[:count]
+    std = np.minimum(np.sqrt(np.maximum(own, apart)) / scale[:count], FARTHEST)
+    student = stdtrit(max(float(moves) - count, FEWEST_FREE), PROBABILITY)
+    reach = np.where(apart > own, student, NORMAL_QUANTILE) * std
     reach[lengths[:count] == 0.0] = np.inf
     off = -(inverse @ (scaled.T @ (weight * r)) / scale)[:count] / std
     by = np.outer(scale, scale)
     return Curvature(H * by, inverse / by, float(np.sqrt(values[-1] / values[0])), std, off, reach)
 
 
+def _without_each_move(like: Likelihood, J: Vector, weight: Vector, r: Vector, count: int, prior: Vector) -> Vector:
+    """Return d_k, by how much the coordinates move without the k-th move, (moves, parameters).
+
+    Args:
+        like: the likelihood.
+        J: derivatives of the residuals, scaled, (rows, parameters + moves).
+        weight: W, (rows,).
+        r: residuals, (rows,).
+        count: parameters.
+        prior: information on each before anything is recorded, (parameters,).
+    """
+    moves = len(like.moves)
+    by_z, by_onset = J[:, :count], J[:, count:].sum(axis=1)
+
+    def summed(rows: Vector) -> Vector:
+        """Return sums over the rows of each move, the last over those of none, (moves + 1, columns)."""
+        found = np.zeros((moves + 1, rows.shape[1]))
+        np.add.at(found, like.move_of, rows)
+        return found
+
+    curved = weight[:, None] ** 3 * by_z
+    A = summed((curved[:, :, None] * by_z[:, None, :]).reshape(len(J), count**2)).reshape(moves + 1, count, count)
+    C, D = summed(curved * by_onset[:, None]), by_move(like.move_of, weight**3 * by_onset**2, moves)
+    A[:-1] -= C[:-1, :, None] * C[:-1, None, :] / np.maximum(D, NO_SLOPE)[:, None, None]
+    g = summed((weight * r)[:, None] * by_z)[:-1]
+    return np.asarray(np.linalg.solve(A.sum(axis=0) + np.diag(prior) - A[:-1], g[:, :, None])[:, :, 0])
+
+
 def uncertainty(like: Likelihood, end: End) -> Uncertainty:
     """Judge where a search stays; its Jacobian must be there."""
     count = len(like.parameters)
-    about = _curvature(like, end)
-    std, lower, upper = about.std, end.z - about.reach, end.z + about.reach
+    about, lower, upper = _about(like, end)
     for other in end.as_likely:
-        reach = _curvature(like, other).reach * np.sqrt(1.0 - (other.cost - end.cost) / RISE_95)
-        lower, upper = np.minimum(lower, other.z - reach), np.maximum(upper, other.z + reach)
-    std = np.maximum(std, np.minimum((upper - lower) / (2.0 * NORMAL_QUANTILE), FARTHEST))
-    for i, each in enumerate(like.parameters):
-        if each.index == STATIC:
-            low, high = _static_interval(like, end, i, np.diag(about.information)[count:])
-            determined = std[i] < UNDETERMINED
-            lower[i], upper[i] = (min(lower[i], low), max(upper[i], high)) if determined else (low, high)
-            std[i] = max(std[i] if determined else 0.0, 0.25 * (high - low))
+        _, lowest, highest = _about(like, other)
+        share = np.sqrt(1.0 - (other.cost - end.cost) / RISE_95)
+        lower = np.minimum(lower, other.z - share * (other.z - lowest))
+        upper = np.maximum(upper, other.z + share * (highest - other.z))
+    std = np.maximum(about.std, np.minimum((upper - lower) / (2.0 * NORMAL_QUANTILE), FARTHEST))
     open_ones = _open_combinations(like, about.information[:count, :count])
     root = _root(about.covariance[:count, :count], std)
     return Uncertainty(std, lower, upper, about.condition, open_ones, about.off, root)
+
+
+def _about(like: Likelihood, end: End) -> tuple[Curvature, Vector, Vector]:
+    """Return what the likelihood is like about an end, and between which coordinates 95 % lie there."""
+    about = _curvature(like, end)
+    std, lower, upper = about.std.copy(), end.z - about.reach, end.z + about.reach
+    for i, each in enumerate(like.parameters):
+        if each.index == STATIC:
+            low, high = _static_interval(like, end, i, about)
+            determined = std[i] < UNDETERMINED
+            lower[i], upper[i] = (min(lower[i], low), max(upper[i], high)) if determined else (low, high)
+            std[i] = max(std[i] if determined else 0.0, 0.25 * (high - low))
+    return replace(about, std=std), lower, upper
 
 
 def _root(covariance: Vector, std: Vector) -> Vector:
@@ -157,29 +200,39 @@ def _root(covariance: Vector, std: Vector) -> Vector:
     return np.asarray((vectors / np.sqrt(np.maximum(values, NOTHING))).T / np.maximum(std, NOTHING))
 
 
-def _static_interval(like: Likelihood, end: End, i: int, by_onset: Vector) -> tuple[float, float]:
-    """Return between which coordinates of static friction break-aways cost no more than 1.92 above the least.
-
-    Args:
-        like: the likelihood.
-        end: where a search stays.
-        i: index of static friction among the coordinates.
-        by_onset: curvature by each onset, in periods, (moves,).
-    """
-    theta, parameter = like.theta(end.z), like.parameters[i]
+def _static_interval(like: Likelihood, end: End, i: int, about: Curvature) -> tuple[float, float]:
+    """Return the interval of the i-th coordinate, static friction, by break-aways and what others change of it."""
+    theta = like.theta(end.z)
     path, later = (like.run.run(theta, end.onsets_s + shift * like.run.period_s) for shift in (0.0, SHIFT))
     gains = np.nan_to_num((later.breaks_n - path.breaks_n) / SHIFT / like.load_n)
+    by_onset = np.diag(about.information)[end.z.size :]
     wider = np.hypot(1.0, gains / np.sqrt(np.maximum(by_onset, FARTHEST**-2.0)))[like.broken]
+    low, high = _by_break_aways(like, theta, path, i, wider)
+    others = np.delete(np.arange(end.z.size), i)
+    values, vectors = np.linalg.eigh(about.covariance[np.ix_(others, others)])
+    bounds, below, above = np.array([each.bounds for each in like.parameters]), 0.0, 0.0
+    for way in (NORMAL_QUANTILE * np.sqrt(np.maximum(values, 0.0)) * vectors).T:
+        found = []
+        for step in (-way, way):
+            there = like.theta(np.clip(end.z + np.insert(step, i, 0.0), *bounds.T))
+            found.append(_by_break_aways(like, there, like.run.run(there, end.onsets_s), i, wider))
+        below += max(0.0, *(low - lowest for lowest, _ in found)) ** 2
+        above += max(0.0, *(highest - high for _, highest in found)) ** 2
+    return max(low - below**0.5, float(bounds[i, 0])), min(high + above**0.5, float(bounds[i, 1]))
+
+
+def _by_break_aways(like: Likelihood, theta: Vector, path: ToldPath, i: int, wider: Vector) -> tuple[float, float]:
+    """Return between which values of the i-th coordinate break-aways cost no more than 1.92 above the least."""
+    bounds, z = like.parameters[i].bounds, like.parameters[i].coordinate(theta)
     reach = np.concatenate([-np.geomspace(1.0, 1e-4, 200), [0.0], np.geomspace(1e-4, 1.0, 200)])
-    at = np.unique(np.clip(end.z[i] + reach, *parameter.bounds))
-    static_n = []
-    for z in at:
-        parameter.put(theta, float(z))
-        static_n.append(theta[STATIC])
-    costs = soft(like.rows_of_static(path, np.array(static_n), wider), like.weights.soft).sum(axis=1)
+    at = np.unique(np.clip(z + reach, *bounds))
+    static_n = theta[COULOMB] * np.exp(at)
+    costs = soft(like.rows_of_static(path, static_n, wider), like.weights.soft).sum(axis=1)
     scatter = max(1.0, 2.0 * min(costs) / max(like.broken.size - 1, 1))
     near = np.flatnonzero(costs <= min(costs) + RISE_95 * scatter)
-    return float(at[max(near[0] - 1, 0)]), float(at[min(near[-1] + 1, at.size - 1)])  # where it is dearer already
+    low, high = float(at[max(near[0] - 1, 0)]), float(at[min(near[-1] + 1, at.size - 1)])  # where it is dearer already
+    early = np.sqrt(scatter - 1.0) * like.load_n / static_n[int(np.argmin(costs))]
+    return low, float(min(high + np.log1p(early), bounds[1]))
 
 
 def _open_combinations(like: Likelihood, H: Vector) -> tuple[Combination, ...]:

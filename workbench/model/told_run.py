@@ -166,7 +166,7 @@ class ToldRun:
         loose = np.bincount(begins, minlength=periods + 1) - np.bincount(
             np.maximum(part.overs, begins), minlength=periods + 1
         )
-        held = (np.cumsum(loose)[:-1] == 0).astype(np.float64)
+        held: Vector = (np.cumsum(loose)[:-1] == 0).astype(np.float64)
         begin_s, end_s = part.starts_s[at], part.starts_s[at + 1]
         held[at] = np.maximum(np.minimum((onset_s - begin_s) / (end_s - begin_s), 1.0), 0.0)
         return held
