@@ -11,9 +11,11 @@ from sim.composition import Composition
 from sim.karnopp import Vector
 from tests.cases import few_always
 from tests.workbench.valves import SLIM, record_of
+from workbench.blind.hiding import hide
 from workbench.data.record import ready
 from workbench.fit.ends import search_about
 from workbench.fit.fit_result import terms
+from workbench.fit.fitting import fit
 from workbench.fit.likelihood import Groups, Likelihood, soft
 from workbench.fit.minimiser import Effort, End, derivatives, descend
 from workbench.fit.problem import problem
@@ -68,7 +70,7 @@ def test_the_truth_lies_inside_in_nineteen_of_twenty(like: Likelihood, scatter: 
     for _ in range(DRAWS):
         own = scatter * generator.standard_normal(moves + 1) * np.where(np.arange(moves + 1) % TELL, 1.0, 4.0)
         held += straight.held(own[move_of] + generator.standard_normal(like.count))
-    assert held >= 0.85 * DRAWS, "by samples alone 63 of 100, where the valve scatters"
+    assert held >= 0.9 * DRAWS, "by samples alone 63 of 100 where the valve scatters, by as many degrees as moves 87"
 
 
 def test_a_combination_names_who_takes_part_in_it_and_by_which_power() -> None:
@@ -129,3 +131,10 @@ def test_an_interval_reaches_over_another_end_that_is_as_likely(like: Likelihood
     both = uncertainty(like, replace(end, as_likely=(other,)))
     assert both.upper[0] > other.z[0]
     assert both.lower[0] == alone.lower[0]
+
+
+def test_static_friction_takes_on_what_is_open_of_an_excess_at_rest() -> None:
+    """A break-away tells F_s + F_x: of an excess lost faster than any sample shows, F_s may be the whole or less."""
+    hidden = hide(81026, effects=("stribeck",))
+    static = fit(hidden.fit, hidden.base, effects=["stribeck"]).parameters["static_n"]
+    assert static.lower <= hidden.truth.valve.static_n <= static.upper

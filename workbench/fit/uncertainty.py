@@ -8,13 +8,17 @@
                              A = sum_k A_k curvature by coordinates, onsets eliminated, g_k = J_k' W_k r_k
 
 H^-1 is right where the residuals are the noise; the jackknife by moves (Tukey) where landings scatter by
-themselves, and every move is but one witness. An interval is z +- t sqrt C, t Student's of n - p degrees of freedom. It
-reaches over those of other ends that are nearly as likely (`ends`).
+themselves, and every move is but one witness. An interval is z +- t sqrt C, t Student's with the degrees of freedom of
+those moves that tell of a coordinate (Satterthwaite; Bell and McCaffrey), v_k what the k-th brings to its variance:
+
+    nu = (sum v_k)^2 / sum v_k^2,   v_k = diag (A - A_k)^-1 A_k (A - A_k)^-1
+
+It reaches over the intervals of other ends that are nearly as likely (`ends`).
 
 Static friction is what break-aways leave open. Their interval reaches over all values whose cost, by break-aways alone,
 is within 1.92 of the least; farther by what it changes, in squares, 1.96 deviations along each principal direction of
-the other coordinates; and over that of the curvature, where this determines it. A load at an onset is known as well as
-that onset,
+the other coordinates; and over z +- 1.96 sqrt C where the curvature determines it. A load at an onset is known as well
+as that onset,
 
     r_k / sqrt(1 + (dr_k / do_k)^2 / D_k)     D_k the curvature by the k-th onset
 
@@ -122,21 +126,22 @@ def _curvature(like: Likelihood, end: End) -> Curvature:
     values, vectors = np.linalg.eigh(H)
     values = np.maximum(values, NOTHING * values[-1])
     inverse = (vectors / values) @ vectors.T
-    without = _without_each_move(like, scaled, weight, r, count, (FARTHEST * scale[:count]) ** -2.0)
+    without, free = _without_each_move(like, scaled, weight, r, count, (FARTHEST * scale[:count]) ** -2.0)
     moves = len(without)
     apart = (moves - 1.0) / moves * np.sum(without**2, axis=0)
     own = np.diag(inverse)[:count]
     std = np.minimum(np.sqrt(np.maximum(own, apart)) / scale[:count], FARTHEST)
-    student = stdtrit(max(float(moves) - count, FEWEST_FREE), PROBABILITY)
-    reach = np.where(apart > own, student, NORMAL_QUANTILE) * std
+    reach = np.where(apart > own, stdtrit(np.maximum(free, FEWEST_FREE), PROBABILITY), NORMAL_QUANTILE) * std
     reach[lengths[:count] == 0.0] = np.inf
     off = -(inverse @ (scaled.T @ (weight * r)) / scale)[:count] / std
     by = np.outer(scale, scale)
     return Curvature(H * by, inverse / by, float(np.sqrt(values[-1] / values[0])), std, off, reach)
 
 
-def _without_each_move(like: Likelihood, J: Vector, weight: Vector, r: Vector, count: int, prior: Vector) -> Vector:
-    """Return d_k, by how much the coordinates move without the k-th move, (moves, parameters).
+def _without_each_move(
+    like: Likelihood, J: Vector, weight: Vector, r: Vector, count: int, prior: Vector
+) -> tuple[Vector, Vector]:
+    """Return d_k, by how much the coordinates move without the k-th move, (moves, parameters), and nu, (parameters,).
 
     Args:
         like: the likelihood.
@@ -149,18 +154,21 @@ def _without_each_move(like: Likelihood, J: Vector, weight: Vector, r: Vector, c
     moves = len(like.moves)
     by_z, by_onset = J[:, :count], J[:, count:].sum(axis=1)
 
-    def summed(rows: Vector) -> Vector:
+    def sums(rows: Vector) -> Vector:
         """Return sums over the rows of each move, the last over those of none, (moves + 1, columns)."""
         found = np.zeros((moves + 1, rows.shape[1]))
         np.add.at(found, like.move_of, rows)
         return found
 
     curved = weight[:, None] ** 3 * by_z
-    A = summed((curved[:, :, None] * by_z[:, None, :]).reshape(len(J), count**2)).reshape(moves + 1, count, count)
-    C, D = summed(curved * by_onset[:, None]), by_move(like.move_of, weight**3 * by_onset**2, moves)
+    A = sums((curved[:, :, None] * by_z[:, None, :]).reshape(len(J), count**2)).reshape(moves + 1, count, count)
+    C, D = sums(curved * by_onset[:, None]), by_move(like.move_of, weight**3 * by_onset**2, moves)
     A[:-1] -= C[:-1, :, None] * C[:-1, None, :] / np.maximum(D, NO_SLOPE)[:, None, None]
-    g = summed((weight * r)[:, None] * by_z)[:-1]
-    return np.asarray(np.linalg.solve(A.sum(axis=0) + np.diag(prior) - A[:-1], g[:, :, None])[:, :, 0])
+    g = sums((weight * r)[:, None] * by_z)[:-1]
+    without = np.linalg.inv(A.sum(axis=0) + np.diag(prior) - A[:-1])
+    share = np.diagonal(without @ A[:-1] @ without, axis1=1, axis2=2)
+    free = share.sum(axis=0) ** 2 / np.maximum((share**2).sum(axis=0), np.finfo(float).tiny)
+    return (without @ g[:, :, None])[:, :, 0], free
 
 
 def uncertainty(like: Likelihood, end: End) -> Uncertainty:
@@ -185,9 +193,9 @@ def _about(like: Likelihood, end: End) -> tuple[Curvature, Vector, Vector]:
     for i, each in enumerate(like.parameters):
         if each.index == STATIC:
             low, high = _static_interval(like, end, i, about)
-            determined = std[i] < UNDETERMINED
-            lower[i], upper[i] = (min(lower[i], low), max(upper[i], high)) if determined else (low, high)
-            std[i] = max(std[i] if determined else 0.0, 0.25 * (high - low))
+            std[i] = max(std[i] if std[i] < UNDETERMINED else 0.0, 0.25 * (high - low))
+            by_curvature = NORMAL_QUANTILE * std[i]
+            lower[i], upper[i] = min(low, end.z[i] - by_curvature), max(high, end.z[i] + by_curvature)
     return replace(about, std=std), lower, upper
 
 

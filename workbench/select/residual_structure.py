@@ -30,8 +30,8 @@ SURELY = 10.0
 """Odds of 150 to 1."""
 CLIPPED = 5.0
 FEWEST_ROWS = 100
-RECORDS = 4
-"""Whose states are kept: what was fitted and what was held out, of two diagnoses."""
+STATES_KEPT = 4
+"""Of records: what was fitted and what was held out, of two diagnoses."""
 
 Matrix = npt.NDArray[np.float64]
 
@@ -84,7 +84,7 @@ def _regressors(record: Record, rows: npt.NDArray[np.intp]) -> Matrix:
     return found
 
 
-@lru_cache(maxsize=RECORDS)
+@lru_cache(maxsize=STATES_KEPT)
 def _state(record: Record) -> Matrix:
     """Return the standardised state, (n, 6): the record's own, for every model held against it."""
     state = np.zeros((len(record), 6), order="F")
