@@ -88,10 +88,10 @@ BREAKAGES = (
     ),
     Breakage(
         "a sensor that stands still while the pressure changes is a fault by default",
-        "positioner/control/monitors.py",
+        "positioner/control/lasting_conditions.py",
         "frozen.unanswered_s > frozen.longest_s,",
         "False,",
-        "tests/control/test_monitors.py::"
+        "tests/control/test_lasting_conditions.py::"
         "test_by_default_a_sensor_that_stands_still_is_a_fault_and_a_slow_cycle_an_alarm",
     ),
     Breakage(

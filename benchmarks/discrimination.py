@@ -51,7 +51,7 @@ from workbench.fit.fitting import fit
 from workbench.select.effect_candidates import pressure_speaks_against
 from workbench.select.effect_search import evaluated
 from workbench.select.equivalence import algebraic_class, classes
-from workbench.select.experiment import REST_S, experiment
+from workbench.select.separating_experiment import REST_S, experiment
 
 PERIOD_S = 0.01
 RATE_PA_PER_S = 400e3

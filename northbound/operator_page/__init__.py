@@ -13,10 +13,11 @@ Its files:
     trend_plot              reference, position and pressure as they come, the states as bands
     recorded_plot           the last minutes as recorded, to zoom into
     friction_plot           friction against its baseline
-    controls                signing in; mode, reference, pressure, identification, acknowledgement
+    valve_controls          signing in; mode, reference, pressure, identification, acknowledgement
     signed_in               which role is in front of a tab
     alarm_card              the alarms: seen, shelved
     test_card               tests on the valve: begun with consent, broken off, reported
-    moves_ahead, dialog     what a command is going to do, and the question before it is given
+    moves_ahead             what a command is going to do
+    question_dialog         the question before it is given
     facts                   what is said of a valve, a line each
 """

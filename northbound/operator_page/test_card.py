@@ -14,7 +14,7 @@ from northbound.observer.valve_commands import Confirmation, refusal_for
 from northbound.observer.valve_tests import KEPT_AS, TESTS, ValveTests
 from northbound.observer.valve_view import ValvePicture
 from northbound.observer.watched_valves import Place
-from northbound.operator_page.dialog import Answer, Question
+from northbound.operator_page.question_dialog import Answer, Question
 from northbound.operator_page.signed_in import SignedIn
 from webpage.messages import heading
 from webpage.page_words import in_page_words

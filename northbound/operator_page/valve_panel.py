@@ -13,7 +13,6 @@ from northbound.observer.valve_view import ValvePicture
 from northbound.observer.watched_valves import WatchedValve
 from northbound.operator_page import facts
 from northbound.operator_page.alarm_card import AlarmCard
-from northbound.operator_page.controls import Controls
 from northbound.operator_page.facts import Fact
 from northbound.operator_page.friction_plot import FrictionPlot
 from northbound.operator_page.marks import grey, mark_fault, mark_ne107
@@ -21,6 +20,7 @@ from northbound.operator_page.recorded_plot import RecordedPlot
 from northbound.operator_page.signed_in import SignedIn
 from northbound.operator_page.test_card import TestCard
 from northbound.operator_page.trend_plot import WINDOWS_S, TrendPlot
+from northbound.operator_page.valve_controls import Controls
 from webpage.messages import aside, heading
 from webpage.theme import Theme
 from webpage.units import Units

@@ -1,6 +1,6 @@
 """Supervision: did the daemon run, is the measurement fresh and plausible, does the DCS live, who commands?
 
-What must not last, as a sensor that is frozen or a stem away from its reference, is found by `monitors.py`.
+What must not last, as a sensor that is frozen or a stem away from its reference, is found by `lasting_conditions.py`.
 
 It knows nothing of the law. A fault is latched: the mode falls to hold, the safe action commands, and only an
 acknowledgement after its cause is gone frees the way; then a person or the DCS must choose a mode again. A fault whose

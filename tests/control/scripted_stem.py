@@ -13,9 +13,9 @@ import numpy as np
 
 from config.codes import InhibitReason
 from positioner.control.laws.slides.now import Now
-from positioner.control.laws.slides.slide_balance import Balance
 from positioner.control.laws.slides.slide_law import SlideSettings, let_go, stepped
 from positioner.control.laws.slides.slide_memory import SlideMemory
+from positioner.control.laws.slides.slide_pressure import Balance
 from positioner.estimation.acceptance import Ratios
 from positioner.estimation.landings.breakaway_distance import BreakawayDistance, Interval
 from positioner.estimation.landings.landing_detector import SlideOutcome

@@ -8,7 +8,7 @@ from benchmarks.extended_valve import STROKE_M, Course, Loop, typical
 from config.codes import InhibitReason
 from config.extended_valve import ExtendedValve, Inverse
 from config.valve_file import ValveFile
-from positioner.control.laws.slides.slide_balance import Balance
+from positioner.control.laws.slides.slide_pressure import Balance
 from positioner.estimation.landings.extended_balance import straight_law
 from sim.composition import Composition
 from sim.static_inverse import extended_valve

@@ -7,9 +7,9 @@ import pytest
 from config.codes import InhibitReason
 from positioner.control.laws.slides.now import Now
 from positioner.control.laws.slides.plan import Plan
-from positioner.control.laws.slides.slide_balance import Balance
 from positioner.control.laws.slides.slide_bounds import SlideBounds
 from positioner.control.laws.slides.slide_memory import Anchor, Move, SlideMemory
+from positioner.control.laws.slides.slide_pressure import Balance
 from positioner.estimation.acceptance import Ratios
 from positioner.estimation.landings.breakaway_distance import BreakawayDistance, Interval
 from positioner.estimation.landings.landing_detector import VISIBLE

@@ -21,7 +21,7 @@ from workbench.diagnosis.diagnosis import Diagnosis, diagnose
 from workbench.diagnosis.extension import extend, extension_of
 from workbench.diagnosis.extension_journal import Journal, write_extended
 from workbench.fit.fitting import fit
-from workbench.select.experiment import MENU, experiment
+from workbench.select.separating_experiment import MENU, experiment
 
 BARE = drawn_valve(np.random.default_rng(11))
 LAGGING = with_effect(BARE, "ip_lag", time_constant_s=0.05)
@@ -76,7 +76,7 @@ def test_the_experiment_separates_what_it_was_chosen_for(diagnosed: Diagnosis, t
 
 
 def test_a_valve_is_no_experiment_away_from_itself(diagnosed: Diagnosis, monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setattr("workbench.select.experiment.MENU", dict(list(MENU.items())[:2]))
+    monkeypatch.setattr("workbench.select.separating_experiment.MENU", dict(list(MENU.items())[:2]))
     twins = [diagnosed.best.fit, replace(diagnosed.best.fit)]
     assert experiment(twins, diagnosed.split.test.record).separation < 1.3
 

@@ -33,7 +33,7 @@ from workbench.discriminate.experiment_design import (
 from workbench.discriminate.rival_race import ASKED, RivalRace, Weighed, evidence
 from workbench.fit.fit_result import Fit
 from workbench.fit.fitting import fit
-from workbench.select.experiment import REST_S
+from workbench.select.separating_experiment import REST_S
 
 LIBRARY = {name: shipped_effect(name, "library") for name in shipped_effects()}
 BARE = drawn_valve(np.random.default_rng(11))

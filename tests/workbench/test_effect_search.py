@@ -24,7 +24,7 @@ from workbench.model.sampling import DYNAMIC
 from workbench.select import effect_search
 from workbench.select.effect_candidates import EffectStep, EvaluatedModel, judged_step
 from workbench.select.effect_search import FEWEST_GONE_ON, EffectSearch
-from workbench.select.experiment import Experiment
+from workbench.select.separating_experiment import Experiment
 from workbench.select.tangent_preview import TangentScore
 
 Effects = frozenset[str]

@@ -5,7 +5,7 @@ from itertools import pairwise
 import numpy as np
 import pytest
 
-from workbench.select.experiment import MENU
+from workbench.select.separating_experiment import MENU
 
 PHASE = np.linspace(0.0, 1.0, 10_001)[:-1]
 RESTARTS = "restarts in the same direction after holds"

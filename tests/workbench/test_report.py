@@ -21,7 +21,7 @@ from workbench.diagnosis.extension_journal import Journal
 from workbench.report import Subject, report_comparison, report_diagnosis, report_journal
 from workbench.report.page import plot
 from workbench.report.plot_series import draw_series, extremes, running_s
-from workbench.select.experiment import Experiment
+from workbench.select.separating_experiment import Experiment
 
 plotly = pytest.importorskip("plotly")
 

@@ -38,8 +38,8 @@ from workbench.select.candidate_table import candidate_columns, candidate_table,
 from workbench.select.effect_candidates import EffectCandidate, EffectStep, EvaluatedModel
 from workbench.select.effect_search import EffectSearch, Progress, Race
 from workbench.select.equivalence import undetectable, unseen_without_spring
-from workbench.select.experiment import Experiment
 from workbench.select.forward_selection import ForwardSelection
+from workbench.select.separating_experiment import Experiment
 from workbench.select.tangent_preview import TangentScore, preview
 
 if TYPE_CHECKING:

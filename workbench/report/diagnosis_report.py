@@ -24,7 +24,7 @@ from workbench.report.units import Reading, Shown, of_stroke, times
 from workbench.select.effect_acceptance import LEAST_BIC, LEAST_HELD_OUT
 from workbench.select.effect_candidates import EffectCandidate, EvaluatedModel
 from workbench.select.equivalence import undetectable
-from workbench.select.experiment import Experiment
+from workbench.select.separating_experiment import Experiment
 
 DIAGNOSIS_WORDS = {
     "Effect": "One piece of physics on the way from the command to the indicated position: a lag, a kind of friction, "

@@ -9,6 +9,6 @@ Its files:
     pressure_scatter                              what the noise of a measured pressure moves a stem by: of the floor
     equivalence                                   what no recording tells apart
     tangent_preview                               the quick first ranking
-    experiment                                    the input that tells rivals apart, off a menu
+    separating_experiment                         the input that tells rivals apart, off a menu
     residual_structure                            the meter of what is unexplained
 """

@@ -40,10 +40,10 @@ from workbench.select.effect_candidates import (
     with_added,
 )
 from workbench.select.equivalence import algebraic_class, classes
-from workbench.select.experiment import Experiment, experiment
 from workbench.select.forward_selection import MOST_ADDED, without_missing
 from workbench.select.pressure_errors import pressure_errors
 from workbench.select.pressure_scatter import with_pressure_scatter
+from workbench.select.separating_experiment import Experiment, experiment
 from workbench.select.tangent_preview import preview
 
 BEAM = 3

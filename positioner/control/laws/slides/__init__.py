@@ -6,7 +6,7 @@
     plan                one slide, or two by way of an excursion
     teaching            what a slide taught of break-away
     slide_memory        what is remembered beside the state: the move, the last slide, what excursions have cost
-    slide_balance       where a slide lands, and how break-away goes over the travel
+    slide_pressure      where a slide lands, and how break-away goes over the travel
     now                 what one step is decided from
     reference_course    does the reference rest, or take back what would be corrected
     slide_bounds        what the site sets, and the thresholds

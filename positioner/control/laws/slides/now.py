@@ -8,8 +8,8 @@ from functools import cached_property
 
 from config.codes import InhibitReason
 from positioner.control.laws.boundary import Seen
-from positioner.control.laws.slides.slide_balance import Balance
 from positioner.control.laws.slides.slide_bounds import SlideBounds
+from positioner.control.laws.slides.slide_pressure import Balance
 from positioner.estimation.landings.landing_detector import SlideOutcome
 from positioner.estimation.landings.stem_at_rest import Rest
 

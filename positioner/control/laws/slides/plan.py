@@ -1,6 +1,6 @@
 """Which slides bring a stem from its rest to where it shall be: one, or two by way of an excursion.
 
-    B(x, s)    pressure under which a slide in direction s lands at x            (slide_balance.py)
+    B(x, s)    pressure under which a slide in direction s lands at x            (slide_pressure.py)
     d_s        shortest slide that breaks loose in direction s                   (breakaway_distance.py)
 
 With the stem at rest at x, e = r - x and s = sign(e):

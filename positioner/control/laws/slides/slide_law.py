@@ -16,9 +16,9 @@ from config.daemon_file import DaemonFile
 from positioner.control.laws.boundary import Seen
 from positioner.control.laws.slides.now import Now
 from positioner.control.laws.slides.reference_course import ReferenceCourse
-from positioner.control.laws.slides.slide_balance import Balance
 from positioner.control.laws.slides.slide_bounds import DAY_S, SlideBounds
 from positioner.control.laws.slides.slide_memory import Move, SlideMemory
+from positioner.control.laws.slides.slide_pressure import Balance
 from positioner.control.laws.slides.states import Idle, Out, Watching
 from positioner.control.laws.slides.teaching import after_outcome
 from positioner.control.laws.slides.transitions import after

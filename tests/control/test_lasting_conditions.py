@@ -10,7 +10,14 @@ from config.errors import InputError
 from config.loading import validate
 from config.quantities import DeviceStatus
 from positioner.control.controller_memory import Decision
-from positioner.control.monitors import IN_VAIN, UNKNOWN_S, MonitorMemory, MonitorSettings, after_cycle, needs_of
+from positioner.control.lasting_conditions import (
+    IN_VAIN,
+    UNKNOWN_S,
+    MonitorMemory,
+    MonitorSettings,
+    after_cycle,
+    needs_of,
+)
 from positioner.control.rest_band import RestBand
 from positioner.estimation.acceptance import Ratios
 from tests.control.test_controller import LAW, STROKE_M, Bench, automatic

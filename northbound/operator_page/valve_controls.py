@@ -17,8 +17,8 @@ from northbound.observer.valve_commands import EXCITATION, Confirmation, refusal
 from northbound.observer.valve_view import TREND_S, ValvePicture
 from northbound.observer.waiting_reference import reference_writer
 from northbound.observer.watched_valves import WatchedValve
-from northbound.operator_page.dialog import Answer, Question
 from northbound.operator_page.moves_ahead import Ahead
+from northbound.operator_page.question_dialog import Answer, Question
 from northbound.operator_page.signed_in import SignedIn
 from webpage.messages import aside, heading
 from webpage.number_field import NumberField
