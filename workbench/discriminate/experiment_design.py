@@ -1,7 +1,7 @@
 """An experiment designed for rivals: levels, ramps and holds sought so that a refit imitates as little as possible.
 
 A course is a first level and legs, each a ramp to a level, then a hold; a leg is a move. It begins as some consecutive
-moves of an input of the menu (`separating_experiment`) and is changed at random, one leg or all lengths at a time, a change kept
+moves of an input of the menu (`separating_experiment`). One leg, or all lengths, is changed at random; a change is kept
 if it separates more.
 
 A valve A answers a course, under a pressure noise that makes it repeat itself no better than the recordings show. It

@@ -14,7 +14,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from sim.karnopp import Vector
-from workbench.fit.likelihood import Likelihood, by_move, soft_weight
+from workbench.fit.likelihood import Likelihood, coupling, soft_weight
 from workbench.fit.minimiser import DAMPING, NO_SLOPE, End, descend
 from workbench.fit.onsets import SEARCH as ONSETS
 from workbench.fit.onsets import with_onsets
@@ -98,9 +98,7 @@ def _cheapest(
 
 def _onsets_by_z(like: Likelihood, end: End) -> Vector:
     """Return by how many periods the best onsets move with each coordinate, (moves, parameters)."""
-    count, moves = end.z.size, len(like.moves)
-    by_z, by_onset = end.jacobian[:, :count], end.jacobian[:, count:].sum(axis=1)
-    weighed = soft_weight(end.groups.whole, like.weights.soft) * by_onset
-    D = by_move(like.move_of, weighed * by_onset, moves)
-    C_o = np.array([by_move(like.move_of, weighed * column, moves) for column in by_z.T]).reshape(count, moves)
+    by_z, by_onset = np.hsplit(end.jacobian, [end.z.size])
+    weight = soft_weight(end.groups.whole, like.weights.soft)
+    C_o, D = coupling(like.move_of, by_z, by_onset.sum(axis=1), weight, len(like.moves))
     return np.asarray(-np.where(D > NO_SLOPE, C_o / np.maximum(D, NO_SLOPE), 0.0).T)

@@ -302,6 +302,20 @@ def soft_weight(r: Vector, scale: float = WEIGHTS.soft) -> Vector:
     return np.asarray(1.0 / np.sqrt(1.0 + (r / scale) ** 2))
 
 
+def coupling(of: Rows, by_z: Vector, by_onset: Vector, weight: Vector, moves: int) -> tuple[Vector, Vector]:
+    """Return C, (parameters, moves), and D, (moves,): curvature by a coordinate and an onset, and by an onset alone.
+
+    Args:
+        of: as `Likelihood.move_of`, (rows,).
+        by_z: derivatives of the residuals, (rows, parameters).
+        by_onset: the same by the onset of the move that each belongs to, (rows,).
+        weight: of each residual's square, (rows,).
+        moves: how many.
+    """
+    C = np.array([by_move(of, weight * by_onset * column, moves) for column in by_z.T])
+    return C.reshape(by_z.shape[1], moves), by_move(of, weight * by_onset**2, moves)
+
+
 def by_move(of: Rows, values: Vector, moves: int) -> Vector:
     """Return sums over the rows that belong to each move, (moves,); `of` as `Likelihood.move_of`."""
     return np.asarray(np.bincount(of, values, moves + 1)[:-1], dtype=np.float64)

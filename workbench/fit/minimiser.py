@@ -27,7 +27,7 @@ import numpy as np
 from sim.composition import COULOMB, SPRING, STATIC, VISCOUS
 from sim.karnopp import Vector
 from workbench.fit.breaking_off import go_on
-from workbench.fit.likelihood import Groups, Likelihood, Rows, by_move, soft, soft_weight
+from workbench.fit.likelihood import Groups, Likelihood, Rows, by_move, coupling, soft, soft_weight
 from workbench.fit.onsets import SEARCH as ONSETS
 from workbench.fit.onsets import SHIFT
 
@@ -215,8 +215,8 @@ def _step(ground: Ground, here: Place, r: Vector, slopes: Slopes, damping: float
     J, j = slopes
     weight = soft_weight(r, ground.soft)
     A, g_z = J.T @ (weight[:, None] * J), J.T @ (weight * r)
-    D, g_o = ground.of_moves(weight * j**2), ground.of_moves(weight * r * j)
-    C = np.array([ground.of_moves(weight * j * column) for column in J.T]).reshape(here.z.size, here.o.size)
+    C, D = coupling(ground.of, J, j, weight, here.o.size)
+    g_o = ground.of_moves(weight * r * j)
     diagonal = np.diag(A).copy()
     stays = ((here.o <= ground.low.o) & (g_o > 0.0)) | ((here.o >= ground.high.o) & (g_o < 0.0)) | (D <= NO_SLOPE)
     usual = D.mean() if D.size else 0.0  # an onset that its move hardly hangs on is not thrown about for it

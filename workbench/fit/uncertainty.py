@@ -37,7 +37,7 @@ from scipy.special import stdtrit
 
 from sim.composition import COULOMB, STATIC
 from sim.karnopp import Vector
-from workbench.fit.likelihood import Likelihood, by_move, soft, soft_weight
+from workbench.fit.likelihood import Likelihood, coupling, soft, soft_weight
 from workbench.fit.minimiser import NO_SLOPE, End
 from workbench.fit.onsets import SHIFT
 from workbench.model.told_run import ToldPath
@@ -162,8 +162,8 @@ def _without_each_move(
 
     curved = weight[:, None] ** 3 * by_z
     A = sums((curved[:, :, None] * by_z[:, None, :]).reshape(len(J), count**2)).reshape(moves + 1, count, count)
-    C, D = sums(curved * by_onset[:, None]), by_move(like.move_of, weight**3 * by_onset**2, moves)
-    A[:-1] -= C[:-1, :, None] * C[:-1, None, :] / np.maximum(D, NO_SLOPE)[:, None, None]
+    C, D = coupling(like.move_of, by_z, by_onset, weight**3, moves)
+    A[:-1] -= C.T[:, :, None] * C.T[:, None, :] / np.maximum(D, NO_SLOPE)[:, None, None]
     g = sums((weight * r)[:, None] * by_z)[:-1]
     without = np.linalg.inv(A.sum(axis=0) + np.diag(prior) - A[:-1])
     share = np.diagonal(without @ A[:-1] @ without, axis1=1, axis2=2)
