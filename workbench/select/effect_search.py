@@ -195,10 +195,18 @@ class EffectSearch:
         go_on = set(sorted(better, key=lambda name: found[name].cost)[:FEWEST_GONE_ON])
         go_on |= {name for name in better if promise[name] > 0.0 and found[name].cost < GONE_ON * least}
         trials |= found
+        self._fit(number, here, {name: trials[name] for name in ordered if name in go_on}, to_the_end=True)
+        step = judged_step(here.before, here.models, number, self._library)
+        enough = here.before.explained or any(each.accepted for each in step.candidates)
+        # Before it is said that no effect explains a record, each is searched to its end.
+        self._fit(number, here, {name: trials[name] for name in ordered if name not in go_on}, to_the_end=not enough)
+
+    def _fit(self, number: int, here: _Round, trials: Mapping[str, Trial | str], *, to_the_end: bool) -> None:
+        """Fit what was tried beside a model, to the end or as far as it came."""
         with closing(
-            on_threads(lambda name: self._fitted(trials[name], name in go_on), ordered, self._workers)
+            on_threads(lambda each: self._fitted(each, to_the_end), tuple(trials.values()), self._workers)
         ) as fits:
-            for name, each in zip(ordered, fits, strict=True):
+            for name, each in zip(trials, fits, strict=True):
                 here.models[name] = each
                 if not isinstance(each, str):
                     self._race(number, name, each.fit.rms_m)
