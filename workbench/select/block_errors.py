@@ -179,16 +179,21 @@ def _on_held_out(fit: Fit, part: Part) -> _Told:
 
 
 def _open(fit: Fit, like: Likelihood, z: Column) -> list[Column]:
-    """Return other coordinates, along each that a fit leaves open; static friction is what break-aways say."""
+    """Return other coordinates, along each that a fit leaves open; along static friction, of which it knows a range."""
     deviation = np.sqrt(np.diag(np.linalg.pinv(fit.known.root.T @ fit.known.root)))
     found = []
     for i, each in enumerate(like.parameters):
-        if deviation[i] > LEFT_OPEN and each.index != STATIC:
-            ahead = np.geomspace(LEFT_OPEN, min(2.0 * deviation[i], FARTHEST), MOST_TRIED)
-            for by in (*-ahead[::-1], *ahead):
-                there = z.copy()
-                there[i] = np.clip(z[i] + by, *each.bounds)
-                found.append(there)
+        farthest = min(2.0 * deviation[i], FARTHEST)
+        if each.index == STATIC:
+            ahead = farthest * np.arange(1, MOST_TRIED + 1) / MOST_TRIED
+        elif deviation[i] > LEFT_OPEN:
+            ahead = np.geomspace(LEFT_OPEN, farthest, MOST_TRIED)
+        else:
+            continue
+        for by in (*-ahead[::-1], *ahead):
+            there = z.copy()
+            there[i] = np.clip(z[i] + by, *each.bounds)
+            found.append(there)
     return found
 
 
