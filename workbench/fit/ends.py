@@ -31,7 +31,7 @@ class Places:
     """How places are drawn about an end."""
 
     seed: int = 1
-    draws: int = 16
+    draws: int = 32
     """Of a round: one simulation each, as many as a descent of a few steps takes."""
     spread: float = 1.5
     """Deviations: the next valley lies beyond what this one leaves open, but not far."""
