@@ -277,7 +277,8 @@ def test_a_killed_daemon_leaves_a_whole_recording(shared: Site, tmp_path: Path) 
     (recording,) = (tmp_path / "recordings").glob("*.csv")
     read = read_recording(recording)
     assert len(read) > 200
-    assert "torn" not in read.metadata
+    # A kill may cut a write at a page's end: at most the last line is torn, left out, and said to be.
+    assert read.metadata.get("torn", "the last line").startswith("the last line")
 
 
 def test_a_port_in_use_is_one_line(shared: Site, tmp_path: Path) -> None:
