@@ -209,8 +209,8 @@ def without_holes(run: Run) -> list[Run]:
     return list(runs_within(run, 0))
 
 
-def words_of(run: Run) -> int:
-    """Return how many registers a run reads."""
+def words_of(run: Mapping[str, Laid]) -> int:
+    """Return over how many registers a run goes."""
     return max(each.end for each in run.values()) - min(each.address for each in run.values())
 
 

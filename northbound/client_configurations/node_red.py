@@ -9,7 +9,7 @@ import json
 from collections.abc import Sequence
 from typing import TYPE_CHECKING, Any
 
-from config.modbus_map import MOST_REGISTERS, runs_within
+from config.modbus_map import MOST_REGISTERS, runs_within, words_of
 from config.registers import REGISTERS, Register
 
 if TYPE_CHECKING:
@@ -100,5 +100,4 @@ def _row(row: int, file: "DaemonFile", registers: Sequence[Register]) -> list[di
 def _blocks(registers: Sequence[Register]) -> list[tuple[int, int]]:
     """Return the requests that read all registers: first address and number of each."""
     runs = runs_within({each.name: each for each in registers}, MOST_REGISTERS)
-    ends = [(min(each.address for each in run.values()), max(each.end for each in run.values())) for run in runs]
-    return [(start, end - start) for start, end in ends]
+    return [(min(each.address for each in run.values()), words_of(run)) for run in runs]

@@ -42,7 +42,7 @@ class ExportMapping(Schema):
     @property
     def words(self) -> tuple[str, ...]:
         """The same as words of a command line."""
-        return words_of(self.model_dump())
+        return option_words(self.model_dump())
 
     def read(self, path: Path, stroke_m: float | None = None, progress: Progress | None = None) -> Recording:
         """Read an export; `stroke_m` counts where the mapping says none.
@@ -61,10 +61,10 @@ class MappingFile(Schema):
     export: ExportMapping
 
 
-def words_of(options: Mapping[str, Any]) -> tuple[str, ...]:
+def option_words(options: Mapping[str, Any]) -> tuple[str, ...]:
     """Return options, by their names in Python, as words of a command line; None, and none of several, is left out.
 
-    >>> words_of({"column": ("time_s=t", "position_m=PV:%"), "range_pa": (2e4, 1e5), "sheet": None})
+    >>> option_words({"column": ("time_s=t", "position_m=PV:%"), "range_pa": (2e4, 1e5), "sheet": None})
     ('--column', 'time_s=t', '--column', 'position_m=PV:%', '--range-pa', '20000', '100000')
     """
     words: list[str] = []

@@ -96,10 +96,10 @@ def _read_number(word: str, what: str, *, positive: bool = False) -> float:
 
 def export_words(arguments: argparse.Namespace) -> list[str]:
     """Return the words of these arguments, for a command that reads the same files."""
-    from workbench.imports.export_mapping import words_of
+    from workbench.imports.export_mapping import option_words
 
     stretch = {name: getattr(arguments, name) for name in ("from_s", "to_s")}
-    return [*words_of(stretch), *mapping_of(arguments).words]
+    return [*option_words(stretch), *mapping_of(arguments).words]
 
 
 def mapping_of(arguments: argparse.Namespace) -> "ExportMapping":
