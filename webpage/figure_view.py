@@ -9,10 +9,12 @@ from typing import Any
 
 from nicegui import ui
 
-from webpage.plot_colours import LIGHT, Ink
+from webpage.plot_colours import DARK, LIGHT, Ink
 from webpage.theme import Theme
 
 Figure = dict[str, Any]
+SHOWN_AS = {ink: {getattr(LIGHT, each.name): getattr(ink, each.name) for each in fields(Ink)} for ink in (LIGHT, DARK)}
+"""Of each theme: its colours by those of the light one, in which figures are drawn."""
 AT_ONCE = {"mode": "immediate", "transition": {"duration": 0}, "frame": {"duration": 0, "redraw": False}}
 UNUSED = ["lasso2d", "zoomIn2d", "zoomOut2d", "autoScale2d"]
 CONFIG = {"displaylogo": False, "scrollZoom": True, "responsive": True, "modeBarButtonsToRemove": UNUSED}
@@ -54,12 +56,11 @@ class FigureView:
 
     def relayout(self, changes: Mapping[str, Any]) -> None:
         """Change the layout."""
-        self.plot.run_plot_method("relayout", dict(changes))
+        self.plot.run_plot_method("relayout", _recolour(dict(changes), SHOWN_AS[self._theme.ink]))
 
     def _apply_theme(self) -> Figure:
         ink = self._theme.ink
-        changed = {getattr(LIGHT, each.name): getattr(ink, each.name) for each in fields(Ink)}
-        figure = _recolour(self._draw(), changed)
+        figure = _recolour(self._draw(), SHOWN_AS[ink])
         layout = dict(figure.get("layout", {}))
         layout |= {
             "margin": {**layout["margin"], "t": max(BAR_PX, layout["margin"]["t"])},

@@ -10,7 +10,6 @@ from config.valve_file import EffectTable, ValveFile
 from tests.pages.laid_out import hidden
 from tests.workbench.hand_made import LIBRARY
 from tests.workbench.valves import with_effect
-from webpage.plot_colours import LIGHT
 from webpage.units import Units
 from workbench.compare.comparison import compare
 from workbench.data.record import Record, ready
@@ -123,7 +122,7 @@ def test_the_figure_keeps_extremes_and_every_sample_when_it_is_looked_at_closely
     figure.window = Window(777.0, 778.0)
     close = figure.data(("command",))
     assert len(close["x"][0]) == pytest.approx(200, abs=5)
-    assert [each["name"] for each in figure.figure(LIGHT)["data"][: len(LINES)]] == list(LINES)
+    assert [each["name"] for each in figure.figure()["data"][: len(LINES)]] == list(LINES)
 
 
 def test_a_window_is_what_the_plot_says() -> None:

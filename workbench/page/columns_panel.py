@@ -148,9 +148,7 @@ class ColumnsPanel:
             sentences(said, "preview-said")
 
     def _draw(self, read: Opened, stroke_m: float | None) -> Figure:
-        return export_figure(
-            read.recording, math.nan if stroke_m is None else stroke_m, self._desk.units, self._theme.ink
-        )
+        return export_figure(read.recording, math.nan if stroke_m is None else stroke_m, self._desk.units)
 
     def _table(self) -> None:
         rows = [

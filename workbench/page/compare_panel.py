@@ -63,7 +63,7 @@ class ComparePanel:
             jumps = ui.row().classes("items-center")
         with ui.element("section").classes("together compared").props('data-testid="compared"'):
             with ui.column().classes("wide plots"):
-                self._time = FigureView(theme, self._draw, TIME_PX, "position, error and pressure over time")
+                self._time = FigureView(theme, self._figure.figure, TIME_PX, "position, error and pressure over time")
                 self._time.plot.on("plotly_relayout", self._handle_window)
                 self._time.plot.on("plotly_click", self._handle_click, js_handler=POINT)
                 with ui.element("div").classes("together"):
@@ -83,13 +83,10 @@ class ComparePanel:
                 Sliders(self._live, desk.fitted, self._draw_newest, self._draw_in_full, desk.units)
         self._tell(desk.compared)
 
-    def _draw(self) -> Figure:
-        return self._figure.figure(self._theme.ink)
-
     def _cloud(self, over: str) -> FigureView:
         def draw() -> Figure:
             seen = Seen(self._begin_s, self._figure.window, self._figure.chosen_s)
-            return force_figure(over, self._forces, seen, self._unit, self._theme.ink)
+            return force_figure(over, self._forces, seen, self._unit)
 
         with ui.element("div").style("flex: 1 1 300px; min-width: min(300px, 100%)"):
             return FigureView(self._theme, draw, FORCE_PX, f"friction over {over}")
@@ -174,8 +171,7 @@ class ComparePanel:
         self._figure.stretch = stretch
         window = self._figure.whole if stretch is None else around(stretch)
         self._figure.window = window
-        shapes = self._figure.shades(self._theme.ink)
-        self._time.relayout({"xaxis.range": [window.begin_s, window.end_s], "shapes": shapes})
+        self._time.relayout({"xaxis.range": [window.begin_s, window.end_s], "shapes": self._figure.shades()})
 
     async def _handle_window(self, event: events.GenericEventArguments) -> None:
         window = window_of(event.args, self._figure.whole)

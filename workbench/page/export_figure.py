@@ -1,15 +1,14 @@
 """A recording before it is taken: position and command over time, small, as the chosen columns and units make it."""
 
 from config.recording import Column, Recording
-from webpage.plot_colours import Ink
 from webpage.units import Unit, Units
-from workbench.report.charts import Figure, axis, layout
+from workbench.report.charts import MEASURED, MODEL, Figure, Trace, axis, layout, line
 from workbench.report.plot_series import extremes, round_values, running_s
 
 MOST_DRAWN_POINTS = 900  # more than a screen has columns
 
 
-def export_figure(recording: Recording, stroke_m: float, units: Units, ink: Ink) -> Figure:
+def export_figure(recording: Recording, stroke_m: float, units: Units) -> Figure:
     """Return it; stroke, m, may be NaN."""
     by_setpoint = "command_pa" not in recording.columns
     position = units.position_unit(stroke_m)
@@ -17,8 +16,8 @@ def export_figure(recording: Recording, stroke_m: float, units: Units, ink: Ink)
     along_s = running_s(recording.columns["time_s"])
     return {
         "data": [
-            _line(along_s, recording.columns["position_m"], ("position", position, "y"), ink.measured),
-            _line(along_s, recording.columns[given[0]], (given[1], given[2], "y2"), ink.model),
+            _line(along_s, recording.columns["position_m"], ("position", position, "y"), MEASURED),
+            _line(along_s, recording.columns[given[0]], (given[1], given[2], "y2"), MODEL),
         ],
         "layout": layout(
             margin={"l": 58, "r": 12, "t": 8, "b": 40},
@@ -30,11 +29,8 @@ def export_figure(recording: Recording, stroke_m: float, units: Units, ink: Ink)
     }
 
 
-def _line(along_s: Column, values: Column, told: tuple[str, Unit, str], colour: str) -> Figure:
+def _line(along_s: Column, values: Column, told: tuple[str, Unit, str], colour: str) -> Trace:
     name, unit, y_axis = told
     rows = extremes(values, MOST_DRAWN_POINTS)
-    return {
-        "type": "scatter", "mode": "lines", "name": name, "yaxis": y_axis, "line": {"color": colour, "width": 1.3},
-        "x": round_values(along_s[rows], 4), "y": round_values(unit.per_si * values[rows], 5),
-        "hovertemplate": f"%{{y:.4~g}} {unit.name} at %{{x:.3f}} s<extra>{name}</extra>",
-    }  # fmt: skip
+    x, y = round_values(along_s[rows], 4), round_values(unit.per_si * values[rows], 5)
+    return line(x, y, name, colour, f"%{{y:.4~g}} {unit.name} at %{{x:.3f}} s", yaxis=y_axis)

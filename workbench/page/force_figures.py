@@ -10,11 +10,10 @@ import numpy as np
 from numpy.typing import NDArray
 
 from config.recording import Column
-from webpage.plot_colours import Ink
 from webpage.units import Unit
 from workbench.compare.friction_balance import Forces
 from workbench.page.time_figure import Window
-from workbench.report.charts import Figure, axis, layout
+from workbench.report.charts import EXTENDED, MEASURED, MODEL, Figure, Trace, axis, layout, line
 from workbench.report.plot_series import round_values
 
 TIME_PLACES = 4  # digits after the point
@@ -33,7 +32,7 @@ class Seen:
     chosen_s: tuple[float, ...]
 
 
-def force_figure(over: str, clouds: tuple[Forces, Forces], seen: Seen, unit: Unit, ink: Ink) -> Figure:
+def force_figure(over: str, clouds: tuple[Forces, Forces], seen: Seen, unit: Unit) -> Figure:
     """Return friction of the measurement and of the model over `velocity` or `position`.
 
     Args:
@@ -41,17 +40,16 @@ def force_figure(over: str, clouds: tuple[Forces, Forces], seen: Seen, unit: Uni
         clouds: measured, model.
         seen: what stands out.
         unit: of positions.
-        ink: colours.
     """
     title, field = OVER[over]
     traces = []
-    kinds = (("measured", ink.measured, clouds[0], "circle-open", 7), ("model", ink.model, clouds[1], "circle", 3))
+    kinds = (("measured", MEASURED, clouds[0], "circle-open", 7), ("model", MODEL, clouds[1], "circle", 3))
     for name, colour, cloud, symbol, size in kinds:
         rows = _thin_rows(cloud.friction_n.size)
         at_s = cloud.time_s[rows] - seen.begin_s
         inside = (at_s >= seen.window.begin_s) & (at_s <= seen.window.end_s)
         chosen = np.isin(np.round(at_s, TIME_PLACES), np.round(np.array(seen.chosen_s), TIME_PLACES))
-        kinds_of = ((~inside & ~chosen, 0.15, colour), (inside & ~chosen, 0.85, colour), (chosen, 1.0, ink.better))
+        kinds_of = ((~inside & ~chosen, 0.15, colour), (inside & ~chosen, 0.85, colour), (chosen, 1.0, EXTENDED))
         for which, opacity, drawn in kinds_of:
             marker = {"opacity": opacity, "size": size, "symbol": symbol, "color": drawn}
             traces.append(_cloud(name, cloud, field, rows[which], seen.begin_s, unit.per_si, marker))
@@ -68,15 +66,14 @@ def force_figure(over: str, clouds: tuple[Forces, Forces], seen: Seen, unit: Uni
 
 def _cloud(
     name: str, cloud: Forces, field: str, rows: NDArray[np.int64], begin_s: float, per_si: float, marker: dict[str, Any]
-) -> Figure:
+) -> Trace:
     x: Column = getattr(cloud, field)
-    return {
-        "type": "scatter", "mode": "markers", "name": name,
-        "x": round_values(per_si * x[rows], 4), "y": round_values(cloud.friction_n[rows], 2),
-        "customdata": round_values(cloud.time_s[rows] - begin_s, TIME_PLACES),
-        "marker": marker,
-        "hovertemplate": "%{y:.4~g} N at %{x:.4~g}, %{customdata:.3f} s<extra>" + name + "</extra>",
-    }  # fmt: skip
+    at, height = round_values(per_si * x[rows], 4), round_values(cloud.friction_n[rows], 2)
+    at_s, hover = (
+        round_values(cloud.time_s[rows] - begin_s, TIME_PLACES),
+        "%{y:.4~g} N at %{x:.4~g}, %{customdata:.3f} s",
+    )
+    return line(at, height, name, marker["color"], hover, mode="markers", marker=marker, customdata=at_s)
 
 
 def _thin_rows(count: int) -> NDArray[np.int64]:

@@ -12,12 +12,11 @@ import numpy as np
 
 from config.drive import VALVE
 from config.recording import Column
-from webpage.plot_colours import Ink
 from webpage.units import Unit, Units
 from workbench.compare.comparison_sentences import Stretch, slip_sentences
 from workbench.compare.slip_matching import SlipEvents
 from workbench.data.record import Record
-from workbench.report.charts import Figure, axis, layout
+from workbench.report.charts import EXTENDED, MEASURED, MODEL, QUIET, Figure, Trace, line, over_time
 from workbench.report.plot_series import extremes, round_values, running_s
 
 MOST_LINE_POINTS, MOVING = 2400, 1200
@@ -33,10 +32,10 @@ MARKS = ("missed slip", "spurious slip", "matched slip", "chosen")
 SLIPS = ("missed", "spurious", "matched")
 """What the first of them mark."""
 MARKED = {
-    "missed slip": ("triangle-up", "model", 11),
-    "spurious slip": ("triangle-down-open", "model", 11),
-    "matched slip": ("circle-open", "quiet", 5),
-    "chosen": ("circle", "better", 6),
+    "missed slip": ("triangle-up", MODEL, 11),
+    "spurious slip": ("triangle-down-open", MODEL, 11),
+    "matched slip": ("circle-open", QUIET, 5),
+    "chosen": ("circle", EXTENDED, 6),
 }
 
 
@@ -105,56 +104,40 @@ class TimeFigure:
             y.append(round_values(per_si * self._record.position_m[rows], 4))
         return {"x": x, "y": y, "text": texts}
 
-    def figure(self, ink: Ink) -> Figure:
+    def figure(self) -> Figure:
         """Return all of it as plotly takes it."""
         x, y = self.data().values()
-        traces = [self._trace(name, xs, ys, ink) for name, xs, ys in zip(LINES, x, y, strict=True)]
+        traces = [self._trace(name, xs, ys) for name, xs, ys in zip(LINES, x, y, strict=True)]
         for name, xs, ys, said in zip(MARKS, *self.marks().values(), strict=True):
             symbol, colour, size = MARKED[name]
-            marker = {"symbol": symbol, "size": size, "color": getattr(ink, colour), "line": {"width": 2}}
-            traces.append(
-                {
-                    "type": "scatter", "mode": "markers", "name": name, "x": xs, "y": ys, "marker": marker,
-                    "text": said, "hovertemplate": f"%{{x:.3f}} s<br>%{{text}}<extra>{name}</extra>",
-                    "showlegend": bool(xs),
-                }
-            )  # fmt: skip
-        return {"data": traces, "layout": self._layout(ink)}
-
-    def _layout(self, ink: Ink) -> Figure:
-        zero = {"zeroline": True, "zerolinecolor": ink.quiet, "zerolinewidth": 1}
+            marker = {"symbol": symbol, "size": size, "color": colour, "line": {"width": 2}}
+            points = {"mode": "markers", "marker": marker, "text": said, "showlegend": bool(xs)}
+            traces.append(line(xs, ys, name, colour, "%{x:.3f} s<br>%{text}", **points))
         position, asked = self._unit("measured").name, self._unit("command").name
-        return layout(
+        figure_layout = over_time(
+            f"position, {position}",
+            f"{'set point' if self._by_setpoint else 'pressure'}, {asked}",
+            (self.window.begin_s, self.window.end_s),
             margin={"l": 58, "r": 12, "t": 8, "b": 40},
-            dragmode="zoom",
             uirevision=f"time, {position}, {asked}",
-            shapes=self.shades(ink),
-            xaxis=axis("time, s", anchor="y3", range=[self.window.begin_s, self.window.end_s], showspikes=True,
-                       spikemode="across", spikethickness=1, spikecolor=ink.quiet),
-            yaxis=axis(f"position, {position}", domain=[0.52, 1.0]),
-            yaxis2=axis(f"error, {position}", domain=[0.24, 0.47], **zero),
-            yaxis3=axis(f"{'set point' if self._by_setpoint else 'pressure'}, {asked}", domain=[0.0, 0.19], nticks=4),
-        )  # fmt: skip
+            shapes=self.shades(),
+        )
+        return {"data": traces, "layout": figure_layout}
 
-    def _trace(self, name: str, x: list[Any], y: list[Any], ink: Ink) -> Figure:
+    def _trace(self, name: str, x: list[Any], y: list[Any]) -> Trace:
         y_axis = "y2" if name.startswith("error") else "y3" if name in BELOW else "y"
-        steps = {"shape": "hv"} if name == "command" else {}
-        dash = {"dash": "dot"} if "as opened" in name else {"dash": "dash"} if "saved" in name else {}
-        unit = self._unit(name).name
-        return {
-            "type": "scatter", "mode": "lines", "name": name, "x": x, "y": y, "yaxis": y_axis,
-            "line": {"color": _colour(name, ink), "width": 1.4, **steps, **dash},
-            "hovertemplate": f"%{{y:.4~g}} {unit} at %{{x:.3f}} s<extra>{name}</extra>",
-            "showlegend": bool(x) and y_axis == "y", "connectgaps": False,
-        }  # fmt: skip
+        dash = "dot" if "as opened" in name else "dash" if "saved" in name else "solid"
+        style = {"color": _colour(name), "width": 1.4, "dash": dash, "shape": "hv" if name == "command" else "linear"}
+        hover, shown = f"%{{y:.4~g}} {self._unit(name).name} at %{{x:.3f}} s", bool(x) and y_axis == "y"
+        return line(x, y, name, _colour(name), hover, line=style, yaxis=y_axis, showlegend=shown, connectgaps=False)
 
-    def shades(self, ink: Ink) -> list[Figure]:
+    def shades(self) -> list[Figure]:
         """Return what shades the stretch that a sentence speaks of."""
         if self.stretch is None:
             return []
         ends = {"x0": self.stretch.begin_s, "x1": self.stretch.end_s, "y0": 0, "y1": 1, "yref": "paper"}
-        line = {"color": ink.better, "width": 1}
-        return [{"type": "rect", "fillcolor": ink.better, "opacity": 0.18, "layer": "below", "line": line, **ends}]
+        edge = {"color": EXTENDED, "width": 1}
+        return [{"type": "rect", "fillcolor": EXTENDED, "opacity": 0.18, "layer": "below", "line": edge, **ends}]
 
     def _unit(self, name: str) -> Unit:
         is_pressure = name in BELOW and not self._by_setpoint
@@ -174,12 +157,12 @@ class TimeFigure:
         return round_values(self._along_s[rows], 5), round_values(per_si * values[rows], 5)
 
 
-def _colour(name: str, ink: Ink) -> str:
+def _colour(name: str) -> str:
     if name in ("measured", "pressure"):
-        return ink.measured
+        return MEASURED
     if "fitted" in name:
-        return ink.better
-    return ink.quiet if "opened" in name or "saved" in name or name == "command" else ink.model
+        return EXTENDED
+    return QUIET if "opened" in name or "saved" in name or name == "command" else MODEL
 
 
 def around(stretch: Stretch) -> Window:

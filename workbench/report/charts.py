@@ -5,6 +5,7 @@ from typing import Any
 
 import numpy as np
 
+from webpage.plot_colours import LIGHT
 from workbench.compare.residuals import Correlation, Profile, Spectrum
 from workbench.report.plot_series import significant
 from workbench.report.units import Reading
@@ -12,8 +13,8 @@ from workbench.report.units import Reading
 Figure = dict[str, Any]
 Trace = dict[str, Any]
 
-INK, QUIET, GRID = "#1f2a37", "#5b6675", "#e8ebef"
-MEASURED, MODEL, EXTENDED, BAND = INK, "#d9622b", "#1b7f79", "rgba(31,42,55,0.08)"
+INK, QUIET, GRID = LIGHT.text, LIGHT.quiet, LIGHT.grid
+MEASURED, MODEL, EXTENDED, BAND = LIGHT.measured, LIGHT.model, LIGHT.better, "rgba(31,42,55,0.08)"
 OPEN = "#b8860b"
 FONT = 'system-ui, -apple-system, "Segoe UI", Roboto, "Helvetica Neue", Arial, sans-serif'
 
@@ -46,10 +47,42 @@ def axis(title: str, **changes: Any) -> Figure:
     }
 
 
+def over_time(
+    position: str, asked: str, ends_s: tuple[float, float], *, ground: bool = False, **changes: Any
+) -> Figure:
+    """Return the layout of position, its error and what was asked, one below the other over one time axis.
+
+    Args:
+        position: what it is called, and its unit.
+        asked: the same of what was asked.
+        ends_s: of the time that is shown.
+        ground: position and error stand before ordinates from 0 to 1, y4 and y5, which have their places then.
+        changes: of the layout.
+    """
+    above: Figure = {"domain": [0.50, 1.0]}
+    middle: Figure = {"domain": [0.21, 0.45]}
+    behind = {}
+    if ground:
+        hidden = {"range": [0, 1], "visible": False, "fixedrange": True}
+        behind = {"yaxis4": above | hidden, "yaxis5": middle | hidden}
+        above, middle = {"overlaying": "y4"}, {"overlaying": "y5"}
+    spikes = {"showspikes": True, "spikemode": "across", "spikethickness": 1, "spikecolor": QUIET}
+    zero = {"zeroline": True, "zerolinecolor": QUIET, "zerolinewidth": 1}
+    return layout(
+        dragmode="zoom",
+        xaxis=axis("time, s", anchor="y3", range=list(ends_s), **spikes),
+        yaxis=axis(position, **above),
+        yaxis2=axis(f"error, {position.rpartition(', ')[2]}", **zero, **middle),
+        yaxis3=axis(asked, domain=[0.0, 0.16], nticks=4),
+        **behind,
+        **changes,
+    )
+
+
 def line(
     x: Sequence[float | None], y: Sequence[float | None], name: str, colour: str, hover: str, **changes: Any
 ) -> Trace:
-    """Return a line; `hover` as plotly's template."""
+    """Return a line; `hover` as plotly's template. With `mode="markers"` and a `marker` they are points."""
     return {
         "type": "scatter",
         "mode": "lines",

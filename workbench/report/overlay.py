@@ -14,7 +14,7 @@ from numpy.typing import NDArray
 from config.recording import Column
 from workbench.compare.phases import PHASES, STUCK
 from workbench.compare.slip_matching import SlipEvents
-from workbench.report.charts import GRID, INK, MEASURED, QUIET, Figure, Trace, axis, layout, line
+from workbench.report.charts import MEASURED, QUIET, Figure, Trace, line, over_time
 from workbench.report.plot_series import draw_series, round_values, running_s
 from workbench.report.units import OF_VALVE, Reading
 
@@ -105,37 +105,9 @@ def overlay(
             showlegend=False,
         )
     )
-    return {
-        "data": traces,
-        "layout": layout(
-            margin={"l": 62, "r": 18, "t": 60, "b": 46},
-            dragmode="zoom",
-            xaxis=axis(
-                "time, s",
-                anchor="y3",
-                range=[0.0, float(running_s(time_s)[-1])],
-                showspikes=True,
-                spikemode="across",
-                spikethickness=1,
-                spikecolor=GRID,
-            ),
-            **_axes(bool(shades), f"{asked.name}, {asked.unit}", read),
-        ),
-    }
-
-
-def _axes(has_ground: bool, asked: str, read: Reading) -> Figure:
-    """Return the ordinates; a ground is an axis of its own from 0 to 1, which gives its place to what overlays it."""
-    position, error = {"domain": [0.50, 1.0]}, {"domain": [0.21, 0.45]}
-    ground = {"range": [0, 1], "visible": False, "fixedrange": True}
-    zero = {"zeroline": True, "zerolinecolor": INK, "zerolinewidth": 1}
-    behind = {"yaxis4": position | ground, "yaxis5": error | ground} if has_ground else {}
-    return {
-        "yaxis": axis(read.title("position, mm"), **({"overlaying": "y4"} if has_ground else position)),
-        "yaxis2": axis(read.title("error, mm"), **zero, **({"overlaying": "y5"} if has_ground else error)),
-        "yaxis3": axis(asked, domain=[0.0, 0.16], nticks=4),
-        **behind,
-    }
+    ends_s, titles = (0.0, float(running_s(time_s)[-1])), (read.title("position, mm"), f"{asked.name}, {asked.unit}")
+    margin = {"l": 62, "r": 18, "t": 60, "b": 46}
+    return {"data": traces, "layout": over_time(*titles, ends_s, ground=bool(shades), margin=margin)}
 
 
 def phase_shades(phase: NDArray[np.int64], valid: Mask) -> list[Shade]:
@@ -195,9 +167,6 @@ def _marks(time_s: Column, measured_m: Column, slips: SlipEvents, factor: float)
     ):
         if times:
             rows = np.clip(np.searchsorted(along_s, np.asarray(times)), 0, time_s.size - 1)
-            yield {
-                "type": "scatter", "mode": "markers", "name": name, "yaxis": "y",
-                "x": round_values(np.asarray(times, np.float64), 5), "y": round_values(factor * measured_m[rows], 4),
-                "marker": {"symbol": symbol, "size": 11, "color": colour, "line": {"width": 2, "color": colour}},
-                "hovertemplate": "at %{x:.3f} s<extra>" + name + "</extra>",
-            }  # fmt: skip
+            at, height = round_values(np.asarray(times, np.float64), 5), round_values(factor * measured_m[rows], 4)
+            marker = {"symbol": symbol, "size": 11, "color": colour, "line": {"width": 2, "color": colour}}
+            yield line(at, height, name, colour, "at %{x:.3f} s", mode="markers", marker=marker, yaxis="y")
