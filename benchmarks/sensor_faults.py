@@ -44,7 +44,11 @@ SMALLEST, LARGEST = 5e-4, 0.3
 """Of the stroke."""
 DEVIATIONS, ALLOWED = 3.0, 2e-3
 BEGINS_S = 0.1
-GAVE_UP = (InhibitReason.STAIRCASE_IN_VAIN, InhibitReason.STAIRCASE_UNANSWERED)
+GAVE_UP = (
+    InhibitReason.STAIRCASE_IN_VAIN,
+    InhibitReason.STAIRCASE_LIMITED,
+    InhibitReason.STAIRCASE_UNANSWERED,
+)
 
 
 @dataclass(frozen=True, slots=True)

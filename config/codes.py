@@ -142,6 +142,10 @@ class InhibitReason(Code):
         "one direction is identified: the first move the other way goes by steps until the stem has landed",
     )
     PRESLIDING = 30, "the packing gives way: the stem is moved directly, without a slide"
+    STAIRCASE_LIMITED = (
+        31,
+        "the staircase of slides: within [pressure] the stem does not slide often enough both ways; friction is high",
+    )
 
 
 class Restored(Code):
@@ -278,7 +282,7 @@ class Ne107Cause(Code):
     """What a valve's NE 107 status rests on."""
 
     NONE = 0, "nothing"
-    FAULT = 1, "fault (see there)"
+    FAULT = 1, "fault"
     NOT_AUTOMATIC = 2, "not automatic"
     EXCITED = 3, "excited"
     NOT_IDENTIFIED = 4, "not identified"

@@ -32,6 +32,7 @@ REFUSALS = (
     InhibitReason.EXCITATION_VETOED,
     InhibitReason.AMPLITUDE_ZERO,
     InhibitReason.STAIRCASE_IN_VAIN,
+    InhibitReason.STAIRCASE_LIMITED,
     InhibitReason.STAIRCASE_UNANSWERED,
     InhibitReason.STAIRCASE_REVERSED,
     InhibitReason.EXCITATION_FROM_BEFORE,

@@ -5,9 +5,11 @@ from dataclasses import dataclass
 
 from config.alarm_advice import ADVICE
 from config.codes import AlarmState, Ne107Cause
+from northbound.observer.words import code_text
 
 BITS = ("alarms_active", "alarms_unacknowledged", "alarms_shelved")
 """Registers whose bit n - 1 is cause n."""
+ALARM_READS = (*BITS, "fault")
 
 
 @dataclass(frozen=True, slots=True)
@@ -16,6 +18,8 @@ class SeenAlarm:
 
     cause: Ne107Cause
     state: AlarmState
+    text: str
+    """Its cause; of a fault in force, which."""
 
     @property
     def name(self) -> str:
@@ -40,7 +44,8 @@ def alarms(values: Mapping[str, float]) -> Iterator[SeenAlarm]:
         bit = 1 << (cause - 1)
         state = _state(bool(active & bit), bool(unseen & bit), bool(shelved & bit))
         if state is not AlarmState.NORMAL:
-            yield SeenAlarm(cause, state)
+            faulty = cause is Ne107Cause.FAULT and values.get("fault", 0.0)
+            yield SeenAlarm(cause, state, f"fault: {code_text('fault', values['fault'])}" if faulty else cause.text)
 
 
 def _state(holds: bool, unseen: bool, shelved: bool) -> AlarmState:

@@ -57,7 +57,7 @@ class AlarmCard:
         if shelved and until_s > 0.0:
             state += f", the first till {time.strftime('%H:%M', time.localtime(until_s))}"
         with ui.element("div").classes("alarm-row full-width").props(f'data-testid="alarm-{alarm.name}"'):
-            ui.label(alarm.cause.text).classes("unseen" if alarm.unseen else "")
+            ui.label(alarm.text).classes("unseen" if alarm.unseen else "")
             ui.label(state).classes("quiet")
             ui.label(alarm.advice).classes("quiet")
             with ui.row().classes("items-center"):

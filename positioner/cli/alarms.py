@@ -28,7 +28,7 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
 def run(arguments: argparse.Namespace) -> int:
     """Do what is asked for, then print the alarms; exit status 1 while one is unacknowledged."""
 
-    from northbound.observer.alarms import BITS, alarms
+    from northbound.observer.alarms import ALARM_READS, alarms
 
     wanted = {name: _cause(getattr(arguments, name)) for name in ("shelve", "unshelve") if getattr(arguments, name)}
     if arguments.acknowledge not in (None, "all"):
@@ -39,15 +39,15 @@ def run(arguments: argparse.Namespace) -> int:
             written = {"alarm_acknowledge": cause} if name == "acknowledge" else {"alarm_shelve": cause}
             dcs.set_all({**written, **({} if name == "acknowledge" else {"alarm_shelve_time": for_s})})
         if arguments.acknowledge == "all":
-            for each in alarms(dcs.get_all(*BITS)):
+            for each in alarms(dcs.get_all(*ALARM_READS)):
                 if each.unseen:
                     dcs.set("alarm_acknowledge", each.cause)
-        shown = list(alarms(dcs.get_all(*BITS)))
+        shown = list(alarms(dcs.get_all(*ALARM_READS)))
     if arguments.json:
-        print(json.dumps({each.name: {"state": each.state.text, "cause": each.cause.text} for each in shown}))
+        print(json.dumps({each.name: {"state": each.state.text, "cause": each.text} for each in shown}))
     else:
         for each in shown:
-            print(f"{each.name:20} {each.state.text:36} {each.cause.text}\n{'':20} {each.advice}")
+            print(f"{each.name:20} {each.state.text:36} {each.text}\n{'':20} {each.advice}")
         if not shown:
             print("no alarms")
     return 1 if any(each.unseen for each in shown) else 0

@@ -149,7 +149,7 @@ def climbed(
     if stairs.over(law_valid):
         if law_valid:
             return excitation if stairs.complete else replace(excitation, signal=replace(stairs, complete=True))
-        return replace(excitation, inhibit_reason=InhibitReason.STAIRCASE_IN_VAIN)
+        return replace(excitation, inhibit_reason=stairs.in_vain)
     if outcome is not None and stairs.unanswered(settings.staircase):
         return replace(excitation, inhibit_reason=InhibitReason.STAIRCASE_UNANSWERED)
     if stairs.is_reversed:

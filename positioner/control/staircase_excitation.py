@@ -35,6 +35,7 @@ position is wired the other way round: each further step would take it farther o
 from dataclasses import dataclass, replace
 from math import inf, nan, sqrt
 
+from config.codes import InhibitReason
 from positioner.control.pressure_clamp import clamped
 from positioner.estimation.landings.landing_detector import SlideOutcome
 
@@ -109,6 +110,7 @@ class Staircase:
         up_m, down_m: way over which they lie, the longest without turning round.
         going_m: the same of the direction it goes in.
         turns: how often it turned round.
+        is_limited: whether a limit of the pressure has turned it round inside the window.
         reversal_pa: rise that turned friction round, after a turn; 0: none yet.
         closing: whether it has turned round for the last landing ...
         closed: ... and has had that.
@@ -136,6 +138,7 @@ class Staircase:
     down_m: float = 0.0
     going_m: float = 0.0
     turns: int = 0
+    is_limited: bool = False
     reversal_pa: float = 0.0
     closing: bool = False
     closed: bool = False
@@ -160,6 +163,12 @@ class Staircase:
         """Return whether the staircase has what it wants, or cannot have it."""
         return (law_valid and self.closed) or self.turns >= MOST_TURNS
 
+    @property
+    def in_vain(self) -> InhibitReason:
+        """Why it is over without a law."""
+        few = self.is_limited and min(self.ups, self.downs) < FEWEST_EACH
+        return InhibitReason.STAIRCASE_LIMITED if few else InhibitReason.STAIRCASE_IN_VAIN
+
     def enough(self, law_valid: bool, limits: StaircaseLimits) -> bool:
         """Return whether the staircase has all landings but the one that closes it."""
         wide = min(self.up_m, self.down_m) >= WIDE * limits.window_m
@@ -178,8 +187,10 @@ class Staircase:
         bound_m = limits.high_m if stairs.direction > 0 else limits.low_m
         left_m = stairs.direction * (bound_m - position_m)
         at_limit_pa = limits.maximum_pa if stairs.direction > 0 else limits.minimum_pa
-        if left_m < max(stairs.slide_m, stairs._goes_m(limits)) or left_m <= 0.0 or stairs.level_pa == at_limit_pa:
+        if left_m < max(stairs.slide_m, stairs._goes_m(limits)) or left_m <= 0.0:
             stairs = stairs._turned()
+        elif stairs.level_pa == at_limit_pa:
+            stairs = replace(stairs._turned(), is_limited=True)
         return stairs._next_step(limits)
 
     def _goes_m(self, limits: StaircaseLimits) -> float:

@@ -5,7 +5,7 @@ from dataclasses import replace
 
 import pytest
 
-from config.codes import Fault, State
+from config.codes import Fault, InhibitReason, State
 from config.daemon_file import DaemonFile
 from config.slave_file import SlaveFile
 from config.valve_file import load_valve, shipped_valve
@@ -21,7 +21,7 @@ PERIOD_S = 0.02
 STROKE_M = SEED_LIKE.stroke_m
 
 
-def identified(plant: Plant, maximum_pa: float) -> Decision:
+def excited(plant: Plant, maximum_pa: float) -> VirtualLoop:
     file = DaemonFile.model_validate(
         {
             "valve": {"stroke_m": STROKE_M},
@@ -36,6 +36,11 @@ def identified(plant: Plant, maximum_pa: float) -> Decision:
     loop.cycles(PERIOD_S)
     while loop.decision.state is State.S3_IDENTIFY and loop.decision.progress < 1.0:
         loop.cycles(PERIOD_S)
+    return loop
+
+
+def identified(plant: Plant, maximum_pa: float) -> Decision:
+    loop = excited(plant, maximum_pa)
     loop.end()
     return loop.decision
 
@@ -84,3 +89,8 @@ def test_a_heavy_stem_that_gives_way_before_it_slides_is_found_within_its_deviat
     for each in (found.static_law.up, found.static_law.down):
         assert each.value == pytest.approx(friction_pa, abs=3.0 * each.std)
     assert max(found.static_law.up.std, found.static_law.down.std) < 0.05 * friction_pa
+
+
+def test_friction_that_has_tripled_is_named_where_the_pressure_does_not_suffice() -> None:
+    """A turn needs 145 kPa: the landings are too few both ways, and it is not the valve's law that is crooked."""
+    assert excited(seed_valve(3.0, 0.5), 140e3).decision.inhibit_reason is InhibitReason.STAIRCASE_LIMITED

@@ -54,7 +54,7 @@ def test_every_bit_and_switch_is_said_in_words() -> None:
 
 
 def test_causes_are_all_named() -> None:
-    assert ne107_causes(0b1001) == ["fault (see there)", "not identified"]
+    assert ne107_causes(0b1001) == ["fault", "not identified"]
     assert ne107_causes(math.nan) == []
 
 
