@@ -59,8 +59,8 @@ def over_time(
         ground: position and error stand before ordinates from 0 to 1, y4 and y5, which have their places then.
         changes: of the layout.
     """
-    above: Figure = {"domain": [0.50, 1.0]}
-    middle: Figure = {"domain": [0.21, 0.45]}
+    above: Figure = {"domain": [0.52, 1.0]}
+    middle: Figure = {"domain": [0.24, 0.47]}
     behind = {}
     if ground:
         hidden = {"range": [0, 1], "visible": False, "fixedrange": True}
@@ -73,7 +73,7 @@ def over_time(
         xaxis=axis("time, s", anchor="y3", range=list(ends_s), **spikes),
         yaxis=axis(position, **above),
         yaxis2=axis(f"error, {position.rpartition(', ')[2]}", **zero, **middle),
-        yaxis3=axis(asked, domain=[0.0, 0.16], nticks=4),
+        yaxis3=axis(asked, domain=[0.0, 0.19], nticks=4),
         **behind,
         **changes,
     )
