@@ -46,13 +46,14 @@ def codes() -> str:
 
 def _section(code: type[Code], register: str) -> str:
     said = (code.__doc__ or "").strip().partition("\n")[0]
-    rows = [f"- {int(each)} `{each.name}`{_said(each)}{_beside(each)}" for each in code]
-    return "\n".join([f"## {code.__name__}: register {register}", "", said, "", *rows, ""])
+    width = max(len(each.name) for each in code)
+    rows = [f"{int(each):2} {each.name:{width}} {_said(each)}{_beside(each)}".rstrip() for each in code]
+    return "\n".join([f"## {code.__name__}: register {register}", "", said, "", "```text", *rows, "```", ""])
 
 
 def _said(each: Code) -> str:
     """Return the text of a number; nothing where its name says the same."""
-    return "" if each.text.lower() == each.name.lower().replace("_", " ") else f": {each.text}"
+    return "" if each.text.lower() == each.name.lower().replace("_", " ") else each.text
 
 
 def _beside(each: Code) -> str:

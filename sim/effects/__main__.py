@@ -11,8 +11,6 @@ from sim.effect import PLACES, Effect, Parameter, shipped_effect, shipped_effect
 
 BEGIN = "<!-- catalogue: written by `python -m sim.effects docs/effects.md` -->"
 END = "<!-- end of the catalogue -->"
-WORDS = {"s": "s", "m": "m", "m2": "m²", "m3": "m³", "ms": "(m s)", "n": "N", "ns": "N s", "ns2": "N s²", "pa": "Pa"}
-"""Units as they stand in names, and as they are written."""
 
 
 def catalogue() -> str:
@@ -32,26 +30,18 @@ def renew_catalogue(document: str) -> str:
     return f"{head}{BEGIN}\n{catalogue()}\n\n{END}{tail}"
 
 
-def unit(name: str) -> str:
-    """Return the unit that a parameter's name ends in; 1 for a pure number."""
-    *_, above, last = ["", *name.split("_")]
-    if above != "per":
-        return WORDS.get(last, "1")
-    return f"{WORDS.get(name.split('_')[-3], '1')}/{WORDS[last]}"
-
-
 def _section(effect: Effect) -> Iterator[str]:
     yield f"### {effect.name}"
     yield effect.text
-    yield f"```\n{effect.equation}\n```"
-    yield "\n".join(_line(key, each) for key, each in effect.parameters.items())
-    yield f"In a record: {effect.looks}"
+    lines = [_line(f"{key:{max(map(len, effect.parameters))}}", each) for key, each in effect.parameters.items()]
+    yield "\n".join(["```text", effect.equation, "", *lines, "```"])
+    yield effect.looks
 
 
 def _line(key: str, parameter: Parameter) -> str:
-    given = ", given, not fitted" if parameter.given else ""
-    off = "" if parameter.off is None else f"; {parameter.off:g} is none"
-    return f"- `{key}`, {unit(key)}{given}: {parameter.text}; {parameter.least:g} to {parameter.most:g}{off}"
+    given = ", given" if parameter.given else ""
+    off = "" if parameter.off is None else f"; none: {parameter.off:g}"
+    return f"{key}  {parameter.text}{given}; {parameter.least:g} to {parameter.most:g}{off}"
 
 
 if __name__ == "__main__":

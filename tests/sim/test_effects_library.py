@@ -10,7 +10,7 @@ from config.errors import InputError
 from config.valve_file import ValveParameters, load_valve, shipped_valve
 from sim.composition import BASE, Composition
 from sim.effect import Effect, Parameter, find_effect, read_effect, scale_of
-from sim.effects.__main__ import renew_catalogue, unit
+from sim.effects.__main__ import renew_catalogue
 from sim.open_loop import respond
 from sim.valve import Valve
 from tests.sim.library import EFFECTS, SEED, Series, library, plain, theta_with
@@ -236,21 +236,6 @@ def test_the_document_has_the_catalogue_of_today() -> None:
     assert document == renew_catalogue(document), "stale: run python -m sim.effects docs/effects.md"
     for name in EFFECTS:
         assert f"### {name}\n" in document
-
-
-@pytest.mark.parametrize(
-    ("name", "expected"),
-    [
-        ("time_constant_s", "s"),
-        ("drag_ns2_per_m2", "N s²/m²"),
-        ("rate_per_s", "1/s"),
-        ("filling_pa_per_s", "Pa/s"),
-        ("gain", "1"),
-        ("cubic_n_per_m3", "N/m³"),
-    ],
-)
-def test_the_unit_of_a_name(name: str, expected: str) -> None:
-    assert unit(name) == expected
 
 
 def test_the_document_s_own_effect_runs_from_a_valve_file(tmp_path: Path) -> None:
