@@ -86,6 +86,17 @@ class Known(Brief):
     root: Vector
     """(parameters, parameters)."""
 
+    @property
+    def deviations(self) -> Vector:
+        """Of the coordinates, (parameters,)."""
+        return np.asarray(np.sqrt(np.diag(np.linalg.pinv(self.root.T @ self.root))))
+
+    @property
+    def share_left(self) -> Vector:
+        """What is left open of each coordinate's range, as a share: sqrt(2 pi) deviations, (parameters,)."""
+        width = np.array([high - low for low, high in (each.bounds for each in self.parameters)])
+        return np.asarray(np.minimum(1.0, np.sqrt(2.0 * np.pi) * self.deviations / width))
+
 
 NOTHING = Known((), np.zeros((0, 0)))
 """Of a valve that was not fitted: nothing of it is free."""

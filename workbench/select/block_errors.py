@@ -180,8 +180,7 @@ def _on_held_out(fit: Fit, part: Part) -> _Told:
 
 def _open(fit: Fit, like: Likelihood, z: Column) -> list[Column]:
     """Return other coordinates, along each that a fit leaves open; along static friction, of which it knows a range."""
-    deviation = np.sqrt(np.diag(np.linalg.pinv(fit.known.root.T @ fit.known.root)))
-    found = []
+    deviation, found = fit.known.deviations, []
     for i, each in enumerate(like.parameters):
         farthest = min(2.0 * deviation[i], FARTHEST)
         if each.index == STATIC:

@@ -1,9 +1,14 @@
 """The rule by which an effect is accepted: evidence on what was fitted, and on what was held out.
 
-    evidence = sum_j n_j log(s_j^2 / s_j'^2) - (k' - k) log n
+    evidence = sum_j n_j log(s_j^2 / s_j'^2) - sum_i c_i' + sum_i c_i
                                                of base and candidate ('): s_j^2 mean square residual of the j-th kind,
                                                motion, landings, rests, break-aways, of which n_j are independent; at
-                                               least the noise's. k free parameters, n landings and break-aways
+                                               least the noise's
+    c_i = max(log n, 2 log(w_i / (sqrt(2 pi) d_i)))
+                                               what a free parameter costs: n landings and break-aways; of an effect's
+                                               w_i the range and d_i the deviation of its coordinate (Occam factor,
+                                               MacKay 1992): one that is known to a part in a million was sought at a
+                                               million places
     held-out evidence = sum_j n_j log(s_j^2 / s_j'^2)
                                                of what was held out, the valve as it was fitted: nothing is taken off,
                                                for nothing was fitted there
@@ -77,15 +82,26 @@ def gain(
 
 
 def evidence_for(one: Fit, other: Fit) -> float:
-    """Return the Bayesian information criterion of another fit of the same record less that of one.
+    """Return the evidence for a fit against another of the same record.
 
-    2 (log-likelihood of one less the other's) - (its parameters less the other's) log n, n landings and break-aways:
-    kind by kind the likelihood of `workbench.fit.fit_result.Terms`.
+    2 (log-likelihood of one less the other's) - (the cost of its parameters less the other's): kind by kind the
+    likelihood of `workbench.fit.fit_result.Terms`.
     """
-    return evidence_of(one.terms, len(one.parameters), other)
+    return 2.0 * one.terms.nats_above(other.terms) - (_cost(one) - _cost(other))
 
 
-def evidence_of(terms: Terms, parameters: int, other: Fit) -> float:
-    """Return the same of a likelihood that so many parameters came to."""
+def promise(terms: Terms, parameters: int, other: Fit) -> float:
+    """Return the most evidence that a likelihood may come to, whose so many parameters' deviations are not known."""
     more = parameters - len(other.parameters)
-    return 2.0 * terms.nats_above(other.terms) - more * float(np.log(max(terms.events, 2.0)))
+    return 2.0 * terms.nats_above(other.terms) - more * _log_events(terms)
+
+
+def _cost(fit: Fit) -> float:
+    """Return what the parameters of a fit cost: an effect's by how little of its range is left."""
+    least = _log_events(fit.terms)
+    left = dict(zip((each.name for each in fit.known.parameters), fit.known.share_left, strict=True))
+    return sum(max(least, -2.0 * np.log(left.get(name, 1.0)) if "." in name else least) for name in fit.parameters)
+
+
+def _log_events(terms: Terms) -> float:
+    return float(np.log(max(terms.events, 2.0)))

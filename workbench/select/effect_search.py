@@ -26,7 +26,7 @@ from workbench.fit.fitting import Trial, advance, base_fit, finish, glimpse, lea
 from workbench.fit.problem import Problem, problem
 from workbench.fit.threads import on_threads
 from workbench.select.block_errors import block_errors
-from workbench.select.effect_acceptance import LEAST_BIC, evidence_for, evidence_of
+from workbench.select.effect_acceptance import LEAST_BIC, evidence_for, promise
 from workbench.select.effect_candidates import (
     EffectCandidate,
     EffectStep,
@@ -188,12 +188,12 @@ class EffectSearch:
         better = sorted(found, key=lambda name: found[name].cost)[: max(FEWEST_GONE_ON, (len(found) + 1) // 2)]
         with closing(on_threads(lambda name: advance(found[name]), better, self._workers)) as results:
             found |= dict(zip(better, results, strict=True))
-        promise = {
-            name: evidence_of(each.terms, len(each.like.parameters), here.before.fit) for name, each in found.items()
+        promised = {
+            name: promise(each.terms, len(each.like.parameters), here.before.fit) for name, each in found.items()
         }
         least = min((each.cost for each in found.values()), default=0.0)
         go_on = set(sorted(better, key=lambda name: found[name].cost)[:FEWEST_GONE_ON])
-        go_on |= {name for name in better if promise[name] > 0.0 and found[name].cost < GONE_ON * least}
+        go_on |= {name for name in better if promised[name] > 0.0 and found[name].cost < GONE_ON * least}
         trials |= found
         self._fit(number, here, {name: trials[name] for name in ordered if name in go_on}, to_the_end=True)
         step = judged_step(here.before, here.models, number, self._library)
