@@ -11,6 +11,7 @@ import socket
 import ssl
 import time
 from collections.abc import Sequence
+from contextlib import suppress
 
 from pymodbus.pdu.register_message import (
     ReadHoldingRegistersRequest,
@@ -19,7 +20,15 @@ from pymodbus.pdu.register_message import (
 )
 
 from config.tls_table import Tls
-from fieldbus.modbus.client_errors import ClientError, NobodyThere, NotConnected, Refused, ReplyTimeout, UnexpectedReply
+from fieldbus.modbus.client_errors import (
+    ClientError,
+    DuplicatedReply,
+    NobodyThere,
+    NotConnected,
+    Refused,
+    ReplyTimeout,
+    UnexpectedReply,
+)
 from fieldbus.modbus.exception_codes import exception_code
 from fieldbus.modbus.framing import Framing, MbapFraming
 from fieldbus.modbus.host_address import HostAddress, connected
@@ -103,6 +112,8 @@ class ModbusClient:
         if line is None:
             raise NotConnected(CLOSED)
         try:
+            if early := self._early(line):
+                raise DuplicatedReply(early)
             line.sendall(self._framing.request(pdu))
             return self._reply(line)
         except (OSError, UnexpectedReply) as error:
@@ -117,6 +128,8 @@ class ModbusClient:
         if line is None or self._context is not None:
             return None
         try:
+            if self._early(line):
+                return None
             line.sendall(self._framing.request(pdu))
         except OSError:
             self.close()
@@ -151,6 +164,19 @@ class ModbusClient:
         used, pdu = found
         self._received = self._received[used:]
         return pdu
+
+    def _early(self, line: socket.socket) -> bytes:
+        """Return what came before the next request, so that it answers none; nothing where replies are numbered.
+
+        Taken for the reply, it would make this and each later sample a cycle old.
+        """
+        if not self._framing.is_numbered:
+            line.settimeout(0.0)
+            with suppress(BlockingIOError, ssl.SSLWantReadError):
+                self._received += line.recv(REPLY_PIECE_BYTES)
+            line.settimeout(self._timeout_s)
+            return self._received
+        return b""
 
     def _ended_by(self, error: OSError | UnexpectedReply) -> ClientError:
         """End the connection and return what to raise."""

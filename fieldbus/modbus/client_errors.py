@@ -41,8 +41,8 @@ class OtherTransaction(UnexpectedReply):
 class DuplicatedReply(UnexpectedReply):
     """The reply to the request before came a second time."""
 
-    def __init__(self, frame: bytes, transaction: int) -> None:
-        super().__init__(frame, f"the reply to transaction {transaction} came twice")
+    def __init__(self, frame: bytes) -> None:
+        super().__init__(frame, "the reply to the request before came twice")
 
 
 class OtherUnit(UnexpectedReply):

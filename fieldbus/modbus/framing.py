@@ -31,6 +31,11 @@ _FRAMER = FramerSocket(_DECODER)
 class Framing(Protocol):
     """How one connection frames; owned by its client."""
 
+    @property
+    def is_numbered(self) -> bool:
+        """Whether a reply says which request it answers."""
+        ...
+
     def request(self, pdu: bytes) -> bytes:
         """Return the frame of the next request."""
         ...
@@ -56,7 +61,7 @@ class MbapFraming:
     def __init__(self, unit: int, reply_unit: int | None = None, *, echoes_transaction: bool = True) -> None:
         self._unit = unit
         self._reply_unit = unit if reply_unit is None else reply_unit
-        self._echoes_transaction = echoes_transaction
+        self.is_numbered = echoes_transaction
         self._transaction = 0
 
     def request(self, pdu: bytes) -> bytes:
@@ -73,9 +78,9 @@ class MbapFraming:
             if b"\0\0" <= stream[4:6] < b"\0\2":  # no frame is that short; pymodbus would wait for more
                 raise UnexpectedReply(stream)
             return None
-        if answered != self._transaction and self._echoes_transaction:
+        if answered != self._transaction and self.is_numbered:
             if answered == (self._transaction - 1 or LAST_TRANSACTION):
-                raise DuplicatedReply(stream, answered)
+                raise DuplicatedReply(stream)
             raise OtherTransaction(stream, answered, self._transaction)
         if unit != self._reply_unit:
             raise OtherUnit(stream, unit, self._reply_unit)
@@ -91,6 +96,8 @@ class SerialFraming:
         unit: the unit that is asked.
         reply_unit: what its replies say; None, the same.
     """
+
+    is_numbered = False
 
     def __init__(self, unit: int, reply_unit: int | None = None) -> None:
         self._unit = unit

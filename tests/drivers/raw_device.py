@@ -25,6 +25,8 @@ class Habits:
     """The number that all its replies have."""
     unit: int | None = None
     """The unit that all its replies have."""
+    twice_every: int = 0
+    """Each so many-th reply is sent twice."""
     swapped: tuple[bool, bool] = (False, False)
     """Whether words of a float, and bytes of a word, come the other way round."""
 
@@ -81,7 +83,8 @@ class RawDevice:
                 if time.monotonic() < deaf_until_s:
                     continue
                 if reply := self._framed_answer(request):
-                    line.sendall(reply)
+                    every = self.habits.twice_every
+                    line.sendall(reply * 2 if every and len(self.functions) % every == 0 else reply)
                     deaf_until_s = time.monotonic() + self.habits.pause_s
         except OSError:
             pass

@@ -121,6 +121,32 @@ def test_one_that_is_silent_on_function_16_is_written_by_6(make: Make) -> None:
     assert device.words[31] == 50
 
 
+@pytest.mark.parametrize(
+    ("habits", "keys"),
+    [
+        (Habits(framing="rtu", twice_every=7), {"framing": "rtu"}),
+        (Habits(transaction=0, twice_every=7), {"echoes_transaction": False}),
+        (Habits(twice_every=7), {}),
+    ],
+    ids=["a serial line's frames", "its own transaction", "numbered"],
+)
+def test_a_reply_that_comes_twice_is_not_taken_for_the_next(make: Make, habits: Habits, keys: dict[str, Any]) -> None:
+    """Each sample after it would be a cycle old, and one more with each that comes twice."""
+    device = make(habits)
+    driver = driver_for(described(device, keys))
+    driver.open()
+    kinds = set()
+    for cycle in range(40):
+        device.put_float(POSITION, float(cycle))
+        try:
+            assert driver.exchange(PUSH_PA).position_m == cycle
+        except DriverError as error:
+            kinds.add(error.kind)
+            driver.open()
+    driver.close()
+    assert kinds == {"duplicated reply"}
+
+
 @pytest.mark.parametrize(("by_words", "by_bytes"), [(False, False), (True, False), (False, True), (True, True)])
 def test_a_float_comes_in_any_order_of_words_and_bytes(make: Make, by_words: bool, by_bytes: bool) -> None:
     orders = {
