@@ -9,7 +9,6 @@ from collections.abc import Callable
 from threading import Event, Thread
 
 from config.errors import CommandFailed, InputError
-from config.modbus_map import MOST_REGISTERS
 from config.registers import COMMANDS, REGISTERS, STATUS
 from northbound.observer.valve_view import ValveView
 from positioner.dcs import Dcs
@@ -21,10 +20,11 @@ REST_EVERY = 20
 POLL_AGAIN_S = 0.25
 REPLY_WITHIN_S = 0.5
 
-EACH_TIME = tuple(each.name for each in (*COMMANDS, *STATUS) if each.end <= MOST_REGISTERS)
-"""What one request has room for."""
-COUNTS = ("service", "cycles", "missed_periods", "lost_samples", "lost_replies")
-REST = tuple(each.name for each in REGISTERS if each.name not in {*EACH_TIME, *COUNTS})
+LIVE = tuple(each.name for each in STATUS)
+"""Read each time in one request: the reference that is asked for and the one in force are of one cycle."""
+EACH_TIME = tuple(each.name for each in COMMANDS)
+COUNTS = ("cycles", "missed_periods", "lost_samples", "lost_replies")
+REST = tuple(each.name for each in REGISTERS if each.name not in {*LIVE, *EACH_TIME, *COUNTS})
 
 
 class Poller:
@@ -63,7 +63,7 @@ class Poller:
         """Poll until it fails or is stopped."""
         due_s, polls = time.monotonic(), 0
         while not self._stopping.is_set():
-            values = dcs.get_all(*names_of(polls))
+            values = dcs.get_all(*LIVE) | dcs.get_all(*names_of(polls))
             now_s = time.monotonic()
             self.view.take(now_s, values)
             due_s, polls = max(due_s + POLL_S, now_s), polls + 1
@@ -71,7 +71,7 @@ class Poller:
 
 
 def names_of(poll: int) -> tuple[str, ...]:
-    """Return which registers a poll of a connection reads, counted from 0: the first reads all."""
+    """Return which registers a poll of a connection reads beside `LIVE`, counted from 0: the first reads all."""
     if poll == 0:
         return EACH_TIME + COUNTS + REST
     # The rest apart from the counts: no poll takes much longer than another.

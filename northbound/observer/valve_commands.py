@@ -14,7 +14,7 @@ from config.registers import register_named
 from config.roles import Role
 from northbound.observer.permissives import identify_permissives
 from northbound.observer.valve_view import ValvePicture
-from northbound.observer.waiting_reference import SAME_PU
+from northbound.observer.waiting_reference import SAME_PU, WAITS, waiting_reference
 from northbound.observer.words import CODES, code_text
 from positioner.dcs import Dcs
 
@@ -96,23 +96,24 @@ class ValveCommands:
         """Change who commands the pressure."""
         return self.set(role, "mode", mode)
 
-    def automatic(self, role: Role, seen_pu: float, *, goes: bool) -> Confirmation:
-        """Let the law follow the reference that was seen, or, where it is not to go there, the stem's own place.
+    def automatic(self, role: Role, seen_pu: float | None, *, goes: bool) -> Confirmation:
+        """Let the law follow the reference that waited, or, where it is not to go there, the stem's own place.
 
-        Nothing is written where the register says another by now: the stem would go where nobody has agreed to.
+        Nothing is written where another waits by now: the stem would go where nobody has agreed to.
 
         Args:
             role: of who asks.
-            seen_pu: what register `reference` said when it was agreed to.
+            seen_pu: the opening that waited when it was agreed to; None: none did.
             goes: whether the stem goes there; else its own place is written first.
         """
 
         def write(dcs: Dcs) -> Confirmation:
-            asked_pu = dcs.get("reference")
-            if not abs(asked_pu - seen_pu) <= SAME_PU:
-                now, then = (_as_read("reference", each) for each in (asked_pu, seen_pu))
-                return Confirmation(False, f"nothing was written: the reference is {now} now, it was {then}")
-            to_pu = seen_pu if goes else min(max(dcs.get("position_signal"), 0.0), 1.0)
+            waits_pu = waiting_reference(dcs.get_all(*WAITS))
+            if (waits_pu is None) != (seen_pu is None) or abs((waits_pu or 0.0) - (seen_pu or 0.0)) > SAME_PU:
+                now, then = ("none" if each is None else _as_read("reference", each) for each in (waits_pu, seen_pu))
+                return Confirmation(False, f"nothing was written: the reference that waits is {now} now, it was {then}")
+            to_pu = dcs.get("reference" if goes else "position_signal")
+            to_pu = min(max(to_pu, 0.0), 1.0)
             dcs.set_and_read_back("reference", to_pu)
             return _confirm("mode", Mode.AUTOMATIC, dcs.set_and_read_back("mode", Mode.AUTOMATIC))
 

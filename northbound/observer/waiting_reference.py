@@ -17,6 +17,8 @@ from positioner.history.entries import Write
 
 SAME_PU = 1e-4
 """Of the stroke: the register's other form counts in steps of so much."""
+WAITS = ("reference_opening", "reference_in_force", "mode")
+"""By which registers it waits; of one request, for outside automatic both follow the stem where none was written."""
 NEWEST = 200
 """Writes that are looked through."""
 ITS_WRITE = re.compile(r"\breference(_scaled)? = ")

@@ -44,14 +44,18 @@ class Ahead:
         return self._position(self.picture.value("position"))
 
     @property
+    def waits_pu(self) -> float | None:
+        """The opening that waits; None where none does."""
+        return waiting_reference(self.picture.values)
+
+    @property
     def waits(self) -> str:
-        """The reference that waits; empty where none does."""
-        waiting = waiting_reference(self.picture.values)
-        return "" if waiting is None else self._position(waiting)
+        """The same in words; empty where none does."""
+        return "" if self.waits_pu is None else self._position(self.waits_pu)
 
     def automatic(self) -> list[str]:
         """Say what automatic is going to do."""
-        waiting = waiting_reference(self.picture.values)
+        waiting = self.waits_pu
         if waiting is None:
             return [f"The stem stands at {self.stands}. No other reference waits: it stays there until one is written."]
         way = waiting - self.picture.value("position")

@@ -218,10 +218,9 @@ class Controls:
 
     async def _ask_automatic(self) -> None:
         ahead = await aside(self._ahead)
-        seen_pu = ahead.picture.value("reference")
 
         async def automatic(goes: bool) -> None:
-            await self.do(lambda role: self._valve.commands.automatic(role, seen_pu, goes=goes))
+            await self.do(lambda role: self._valve.commands.automatic(role, ahead.waits_pu, goes=goes))
 
         stay = Answer(f"Stay at {ahead.stands}" if ahead.waits else "Automatic", "stay", lambda: automatic(False))
         go = Answer(f"Go to {ahead.waits}", "go", lambda: automatic(True))

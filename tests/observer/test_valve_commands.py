@@ -53,6 +53,9 @@ class Line:
     def get(self, name: str) -> float:
         return self._daemon.values[name]
 
+    def get_all(self, *names: str) -> dict[str, float]:
+        return {name: self._daemon.values[name] for name in names}
+
     def identify(self, excitation: Mapping[str, float], timeout_s: float, show: Callable[[float], None]) -> str | None:
         for progress in (0.0, 0.5, 1.0):
             if progress == self._daemon.break_off_after:
@@ -78,19 +81,30 @@ def test_a_position_that_is_not_allowed_is_refused_in_what_it_was_typed_in(daemo
     assert daemon.writes == []
 
 
+HELD = {
+    "mode": Mode.HOLD,
+    "reference": 0.7,
+    "position_signal": 0.2,
+    "reference_opening": 0.9,
+    "reference_in_force": 0.1,
+}
+
+
 def test_automatic_goes_where_was_agreed_to_or_stays_where_the_stem_is(daemon: Daemon) -> None:
-    daemon.values |= {"mode": Mode.HOLD, "reference": 0.7, "position_signal": 0.2}
-    for goes, there in ((True, 0.7), (False, 0.2)):
-        daemon.values["reference"] = 0.7
+    for waits, goes, there in ((0.4, True, 0.7), (0.4, False, 0.2), (None, False, 0.2)):
+        asked = 0.1 if waits is None else waits
+        daemon.values |= HELD | {"reference_opening": asked}
         daemon.writes.clear()
-        assert daemon.commands.automatic(Role.ENGINEER, 0.7, goes=goes).done
+        assert daemon.commands.automatic(Role.ENGINEER, waits, goes=goes).done
         assert daemon.writes == [(Role.ENGINEER, "reference", there), (Role.ENGINEER, "mode", Mode.AUTOMATIC)]
 
 
 def test_a_reference_that_has_changed_since_the_question_moves_nothing(daemon: Daemon) -> None:
-    daemon.values |= {"mode": Mode.HOLD, "reference": 0.9, "position": 0.2}
-    seen = daemon.commands.automatic(Role.ENGINEER, 0.7, goes=True)
-    assert seen == Confirmation(False, "nothing was written: the reference is 90 % now, it was 70 %")
+    daemon.values |= HELD
+    for seen_pu, then in ((0.7, "70 %"), (None, "none")):
+        seen = daemon.commands.automatic(Role.ENGINEER, seen_pu, goes=seen_pu is not None)
+        said = f"nothing was written: the reference that waits is 90 % now, it was {then}"
+        assert seen == Confirmation(False, said)
     assert daemon.writes == []
     assert not daemon.commands.automatic(Role.OPERATOR, 0.9, goes=True).done, "mode needs an engineer"
 

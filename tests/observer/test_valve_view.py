@@ -9,10 +9,12 @@ import numpy as np
 import pytest
 
 from config.codes import Fault, Mode, State
+from config.modbus_map import MOST_REGISTERS, runs_within
 from config.registers import BY_NAME, WRITER_AT
-from northbound.observer.poller import COUNTS, EACH_TIME, REST, names_of
+from northbound.observer.poller import COUNTS, EACH_TIME, LIVE, REST, names_of
 from northbound.observer.trends import Trend, bands
 from northbound.observer.valve_view import TREND_S, ValveView
+from northbound.observer.waiting_reference import WAITS
 from northbound.observer.watched_valves import Place, WatchedValve
 from positioner.history.entries import HealthHour
 from positioner.history.history_file import HistoryFile
@@ -158,8 +160,10 @@ def test_bands_end_where_the_next_begins_and_a_gap_is_none() -> None:
 
 
 def test_an_observer_reads_everything_and_what_is_live_every_time() -> None:
-    assert set(names_of(0)) == set(BY_NAME)
-    assert sorted((*EACH_TIME, *COUNTS, *REST)) == sorted(BY_NAME)
+    assert {*LIVE, *names_of(0)} == set(BY_NAME)
+    assert sorted((*LIVE, *EACH_TIME, *COUNTS, *REST)) == sorted(BY_NAME)
+    assert set(WAITS) - set(LIVE) == {"mode"}, "compared with one another: of one cycle"
+    assert len(list(runs_within({name: BY_NAME[name] for name in LIVE}, MOST_REGISTERS))) == 1
     read_in_a_second = [names_of(poll) for poll in range(1, 21)]
     assert all(set(EACH_TIME) <= set(names) for names in read_in_a_second)
     assert sum("friction" in names for names in read_in_a_second) == 1
