@@ -12,7 +12,7 @@ registers, a cycle of the command's own, or virtual time. It needs numpy alone.
     partial_stroke, credit          the partial stroke test; the credit that it may claim
     continuous_stroke               break-away friction in operation, by a command that creeps
     small_steps                     dead band, resolution and step response, by small steps
-    air_rates                       how fast the actuator fills and vents
+    air_rates                       how fast the actuator fills and vents; whether it has air
     commissioning                   from commands and a reading alone to what a daemon's file needs
     outcome                         figures, verdicts by their codes, picture; how they show themselves
     as_found_report                 as found and as left of a valve, as HTML or PDF

@@ -27,7 +27,7 @@ from config.recording import Column, Recording
 from config.travel import ActionWord
 from positioner.response.figure import Figure, no_value
 from positioner.tests_on_the_valve import signature, small_steps
-from positioner.tests_on_the_valve.air_rates import air_rates
+from positioner.tests_on_the_valve.air_rates import air_rates, supply_lacking, unmoved
 from positioner.tests_on_the_valve.outcome import Outcome, Quantity, digits
 from positioner.tests_on_the_valve.program import Bounds, Leap, Player, Program, ramped
 from positioner.tests_on_the_valve.ramps import difference, rate_of, scaled
@@ -110,7 +110,7 @@ def _commissioned(valve: Watching, name: str, bounds: Bounds, show: Callable[[st
     seen_m = max(THRESHOLDS.seen_sigmas * noise_m, THRESHOLDS.seen_digits * digit_m, THRESHOLDS.seen_m)
     sign = _direction(valve, bounds, start_pa, seen_m, show)
     recordings = _ramps(valve, bounds, start_pa, sign, show)
-    if lacking := signature.supply_lacking(recordings):  # a stem that waits for air looks as one on its stop
+    if lacking := supply_lacking(recordings):  # a stem that waits for air looks as one on its stop
         raise _Ended(ValveTestVerdict.NO_SUPPLY, lacking)
     found = signature.signature(recordings, signature.Nameplate(name, 1.0))
     if ValveTestVerdict.NO_SPRING in found.verdicts:
@@ -211,12 +211,8 @@ def _direction(valve: Watching, bounds: Bounds, start_pa: float, moved_m: float,
         farthest = float(gone[int(np.argmax(np.abs(np.convolve(gone, np.ones(5) / 5.0, "same"))))])
         if abs(farthest) > 0.5 * moved_m:
             return way * float(np.sign(farthest))
-    lacking = signature.supply_lacking([recording])
-    if lacking:
-        raise _Ended(ValveTestVerdict.NO_SUPPLY, lacking)
-    raise _Ended(
-        ValveTestVerdict.NOT_MOVED, "over the whole range of commands the reading stands still: stuck, or no supply"
-    )
+    verdict, lacking = unmoved([recording])
+    raise _Ended(verdict, lacking or "over the whole range of commands the reading stands still: stuck, or no supply")
 
 
 def _ramps(

@@ -25,6 +25,7 @@ from config.codes import ExperimentState, ValveTestVerdict
 from config.errors import InputError
 from config.recording import Recording
 from positioner.response.figure import Figure, no_value
+from positioner.tests_on_the_valve.air_rates import unmoved
 from positioner.tests_on_the_valve.breakout import (
     Breakout,
     Rest,
@@ -146,6 +147,10 @@ def partial_stroke(
         *_verdicts(rest, found, travel, asked, stroke_m, tolerance, played.state, after),
     ]
     notes = [f"broken off: {played.problem}"] if broken_off else []
+    if found is None and played.state is ExperimentState.COMPLETE:
+        still, lacking = unmoved([recording])
+        verdicts.append(still)
+        notes += [lacking] if lacking else []
     if tolerance > asked.start * stroke_m:
         notes.append(f"the start tolerance is {recording.kind.length.said(tolerance)}, because of the noise")
     if after is not None and not broken_off and abs(after.position_m - rest.position_m) > tolerance:
@@ -177,8 +182,6 @@ def _verdicts(
     if abs(rest.creep_m) > tolerance:
         yield ValveTestVerdict.DEVIATION
     if found is None:
-        if state is ExperimentState.COMPLETE:
-            yield ValveTestVerdict.NOT_MOVED
         return
     if state is ExperimentState.COMPLETE:
         yield ValveTestVerdict.PRESSURE_THRESHOLD

@@ -18,7 +18,6 @@ Friction over travel is the half distance at the slowest rate, in bins of a tent
 Every +- is two standard deviations. With the diaphragm's area, forces follow in newtons.
 """
 
-from collections.abc import Sequence
 from dataclasses import dataclass, replace
 from itertools import pairwise
 from math import hypot, sqrt
@@ -32,6 +31,7 @@ from config.errors import InputError
 from config.recording import Column, Recording
 from config.results.block import Table
 from positioner.response.figure import Figure, no_value
+from positioner.tests_on_the_valve.air_rates import supply_lacking, unmoved
 from positioner.tests_on_the_valve.outcome import Curve, Outcome, Picture, Quantity
 from positioner.tests_on_the_valve.program import Bounds, Leap, Program, ramped
 from positioner.tests_on_the_valve.ramps import Leg, Line, Ramps, difference, legs_of, ramps_of, scaled
@@ -104,6 +104,8 @@ def signature(recordings: "list[Recording]", plate: Nameplate) -> Outcome:
     rates = ", ".join(f"{1e-3 * each:.3g}" for each in ramps.rates_pa_per_s)
     notes.append(f"{len(ramps.lines)} ramps at {rates} kPa/s")
     verdict, told = _verdict(ramps, travel, 0.5 * (x_0 + x_1), plate)
+    if travel.value is None and (lacking := supply_lacking(recordings)):
+        verdict, told = (ValveTestVerdict.NO_SUPPLY,), [lacking]
     quantities = [
         Quantity("low_m", "lower end of the travel", "m", low),
         Quantity("high_m", "upper end of the travel", "m", high),
@@ -131,24 +133,9 @@ def _without_motion(recordings: "list[Recording]", legs: list[Leg], plate: Namep
     if not legs:
         why = "no ramp in the recording: the command nowhere goes one way over most of its span"
         return Outcome("signature", plate.valve, (), (ValveTestVerdict.UNDETERMINED,), (why,))
-    supply = supply_lacking(recordings)
-    verdict = ValveTestVerdict.NO_SUPPLY if supply else ValveTestVerdict.NOT_MOVED
+    verdict, supply = unmoved(recordings)
     why = supply or "the stem did not follow the command: it is stuck, it has no supply, or the reading is another's"
     return Outcome("signature", plate.valve, (), (verdict,), (why,))
-
-
-def supply_lacking(recordings: "Sequence[Recording]") -> str:
-    """Say how far the measured pressure stays from the command where that is highest; empty where it does not."""
-    for each in recordings:
-        pressure_pa = each.columns.get("pressure_pa")
-        if pressure_pa is None or not np.isfinite(pressure_pa).any():
-            continue
-        command_pa = each.command_pa
-        high = command_pa >= np.nanmax(command_pa) - 1e-3 * np.ptp(command_pa)
-        reached, asked = float(np.nanmax(pressure_pa[high])), float(np.nanmax(command_pa))
-        if asked - reached > THRESHOLDS.supply_lacking * float(np.ptp(command_pa)):
-            return f"the pressure stays at {1e-3 * reached:.4g} kPa where {1e-3 * asked:.4g} kPa is commanded"
-    return ""
 
 
 def _verdict(

@@ -33,7 +33,6 @@ COUNTED_S = 4.0 * PERIOD_S
 """Until the median of five samples has seen it, and the command that answers is obeyed."""
 RATE_PA_PER_S = 20e3
 JUMP_M = 0.05 * STROKE_M
-CALM, BY_MODE = "no fault", "another mode"
 DEVICE = ("jump", "nan", "supply", "drift")
 ENDS_AT_PA = {"hold": None, "vent": 0.0, "fill": MAXIMUM_PA}
 """What is commanded after a fault, by `[safety] action`; None: what was commanded before it."""

@@ -36,6 +36,7 @@ ASKED = PartialStroke()
 ON_THE_SEAT, WIDE_OPEN = Initial(), Initial(position_m=STROKE_M, pressure_pa=130e3)
 TIGHT = told(coulomb_n=400.0, static_n=440.0)
 STUCK = told(coulomb_n=9e3, static_n=9.5e3)
+NO_AIR = DeviceFault(kind="supply", at_s=0.0, to_pa=15e3)
 SLACK = told(coulomb_n=60.0, static_n=66.0)
 
 
@@ -96,6 +97,7 @@ def test_break_out_from_the_upper_stop_is_what_the_spring_and_the_packing_say() 
 
 CASES: list[tuple[str, Callable[[], Outcome], tuple[ValveTestVerdict, ...]]] = [
     ("stuck", lambda: outcome_of(VirtualValve(STUCK)), (V.NOT_MOVED,)),
+    ("no supply", lambda: outcome_of(VirtualValve(STUCK, faults=(NO_AIR,))), (V.NO_SUPPLY,)),
     (
         "threshold",
         lambda: outcome_of(VirtualValve(TIGHT), PartialStroke(threshold_pa=54e3, opening=False)),

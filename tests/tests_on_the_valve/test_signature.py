@@ -133,6 +133,8 @@ def test_what_cannot_be_told_is_said_in_a_code() -> None:
 
     assert verdict(pressure_pa=command_pa) is ValveTestVerdict.NOT_MOVED
     assert verdict(pressure_pa=np.minimum(command_pa, 5e3)) is ValveTestVerdict.NO_SUPPLY
+    pressed_m = 1e-9 * np.minimum(command_pa, 15e3) + 0.1 * noise_m  # onto its seat, which gives
+    assert verdict(position_m=pressed_m, pressure_pa=np.minimum(command_pa, 15e3)) is ValveTestVerdict.NO_SUPPLY
     assert verdict(command_pa=np.full(len(time_s), 50e3)) is ValveTestVerdict.UNDETERMINED
     wrong = signature(recorded(TIGHT), replace(PLATE, stroke_m=0.02))
     assert wrong.verdicts == (ValveTestVerdict.STROKE_DIFFERS,)

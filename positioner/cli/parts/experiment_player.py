@@ -45,9 +45,9 @@ def require_ready(file: "DaemonFile", arguments: argparse.Namespace) -> None:
     if file.recorder is None:
         raise InputError(str(arguments.config), "recorder: is needed, for experiments are read from its recordings")
     folder = _folder(file, arguments)
-    if not folder.is_dir():
-        raise InputError(str(folder), "the recorder's folder is not there: run this on the daemon's machine")
     with _dcs(arguments) as dcs:
+        if not folder.is_dir():
+            raise InputError(str(folder), "the recorder's folder is not there: run this on the daemon's machine")
         if dcs.get("mode") != Mode.AUTOMATIC:
             raise CommandFailed(
                 "the mode is not automatic, so nothing may move the valve: positioner set mode automatic"
