@@ -53,34 +53,46 @@ def rules() -> tuple[Rules, dict[str, str]]:
     return children, above
 
 
-@pytest.fixture(scope="module")
-def made() -> Iterator[tuple[Server, ValveSpace, asyncio.AbstractEventLoop]]:
-    loop = asyncio.new_event_loop()
+OF_ITS_TRAVEL = {"FV-102": ({"stroke_m": 0.04}, "Pa/m"), "FV-103": ({"travel_deg": 90.0}, "Pa/rad")}
+"""Valves described by their travel, and the unit of what is counted by it."""
+Made = tuple[Server, dict[str, ValveSpace], asyncio.AbstractEventLoop]
 
-    async def make() -> tuple[Server, ValveSpace]:
+
+@pytest.fixture(scope="module")
+def served() -> Iterator[Made]:
+    """One server, as a site has it, with a valve of which little is known and those of each travel."""
+    loop = asyncio.new_event_loop()
+    places = [Place("FV-101", "127.0.0.1", 1, 1, range_pa=(0.0, 300e3))]
+    for name, (travel, _) in OF_ITS_TRAVEL.items():
+        settings = DaemonFile.model_validate({"valve": {"name": name, **travel}})
+        places.append(Place(name, "127.0.0.1", 1, 1, settings=settings))
+
+    async def make() -> tuple[Server, dict[str, ValveSpace]]:
         server = Server()
         await server.init()
         spaces, event_type = await load_types(server)
-        place = Place("FV-101", "127.0.0.1", 1, 1, range_pa=(0.0, 300e3))
-        return server, await add_valve(server, spaces, event_type, place)
+        return server, {each.name: await add_valve(server, spaces, event_type, each) for each in places}
 
-    server, valve = loop.run_until_complete(make())
-    yield server, valve, loop
+    server, valves = loop.run_until_complete(make())
+    yield server, valves, loop
     loop.close()
 
 
-@pytest.mark.parametrize(("valve", "unit"), [({"stroke_m": 0.04}, "Pa/m"), ({"travel_deg": 90.0}, "Pa/rad")])
-def test_what_is_counted_by_the_travel_has_the_unit_of_the_valves_own(valve: dict[str, float], unit: str) -> None:
+@pytest.fixture
+def made(served: Made) -> tuple[Server, ValveSpace, asyncio.AbstractEventLoop]:
+    server, valves, loop = served
+    return server, valves["FV-101"], loop
+
+
+@pytest.mark.parametrize("name", OF_ITS_TRAVEL)
+def test_what_is_counted_by_the_travel_has_the_unit_of_the_valves_own(name: str, served: Made) -> None:
+    server, valves, loop = served
+
     async def said() -> str:
-        server = Server()
-        await server.init()
-        spaces, event_type = await load_types(server)
-        settings = DaemonFile.model_validate({"valve": {"name": "FV-102", **valve}})
-        space = await add_valve(server, spaces, event_type, Place("FV-102", "127.0.0.1", 1, 1, settings=settings))
-        node = server.get_node(space.node_id("Estimates.BOverC.EngineeringUnits"))
+        node = server.get_node(valves[name].node_id("Estimates.BOverC.EngineeringUnits"))
         return str((await node.read_value()).DisplayName.Text)
 
-    assert asyncio.run(said()) == unit
+    assert loop.run_until_complete(said()) == OF_ITS_TRAVEL[name][1]
 
 
 def test_every_mandatory_child_of_its_types_is_there(

@@ -161,8 +161,9 @@ def matches(names: Sequence[str], wanted: str, as_written: Sequence[str] = ()) -
     if wanted.startswith("#") and wanted[1:].isdigit() and 0 < int(wanted[1:]) <= len(names):
         return [int(wanted[1:]) - 1]
     for form in (str, _loose, lambda name: _loose(unit_in_header(name)[0])):
+        sought = form(wanted)
         for each in (names, as_written):
-            if found := [index for index, name in enumerate(each) if form(name) == form(wanted)]:
+            if found := [index for index, name in enumerate(each) if form(name) == sought]:
                 return found
     return []
 

@@ -175,7 +175,7 @@ def _of_drive(columns: Sequence[ColumnPreview]) -> dict[str, ColumnPreview]:
 
 def _is_in(ours: str, column: ColumnPreview) -> bool:
     """Whether the file says that a column is in one of the units of ours; mA may be a share of a range."""
-    return column.numbers and column.unit in UNITS[ending_of(ours)] and column.unit not in SHARES
+    return column.unit in UNITS[ending_of(ours)] and column.unit not in SHARES and column.numbers
 
 
 def _doubts(left: Sequence[ColumnPreview]) -> Iterator[str]:
