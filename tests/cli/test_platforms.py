@@ -53,19 +53,17 @@ def recording(tmp_path: Path) -> Path:
 
 
 def test_on_windows_the_daemon_says_in_one_line_what_it_needs() -> None:
-    for words in (command("windows", "run", str(PROFILES / "daemon.toml")), judged("winsim", "run", "daemon.toml")):
-        refused = ended(words)
+    for refused in map(ended, as_pretended("windows", "run", str(PROFILES / "daemon.toml"))):
         assert refused.returncode == 2
         (line,) = refused.stderr.splitlines()
         assert "has no signals that end a process in order and no locks on files, which the daemon needs" in line
 
 
-def judged(script: str, name: str, profile: str) -> list[str]:
-    """Return the command as a script of others has it, or as ours does where that is not there."""
-    path = JUDGES / f"{script}.py"
-    if not path.exists():
-        return command({"winsim": "windows", "macsim": "macos"}[script], name, str(PROFILES / profile))
-    return [sys.executable, str(path), "positioner", name, str(PROFILES / profile)]
+def as_pretended(system: str, *words: str) -> list[list[str]]:
+    """Return the command as we pretend a system, and as a script of others does where that is there."""
+    script = JUDGES / {"windows": "winsim.py", "macos": "macsim.py"}[system]
+    others = [[sys.executable, str(script), "positioner", *words]] if script.exists() else []
+    return [command(system, *words), *others]
 
 
 def test_on_windows_everything_else_can_be_loaded() -> None:
@@ -88,10 +86,9 @@ def files_of(room: str) -> Iterator[Path]:
 
 @pytest.mark.parametrize("system", ["windows", "macos"])
 def test_recordings_are_read_and_compared(system: str, recording: Path) -> None:
-    for words in (["import", str(recording)], ["compare", str(recording), "--valve", "seed"]):
-        done = ended(command(system, *words))
-        assert done.returncode in (0, 1), done.stderr
-        assert "Traceback" not in done.stderr
+    done = ended(command(system, "import", str(recording), "then", "compare", str(recording), "--valve", "seed"))
+    assert done.returncode in (0, 1), done.stderr
+    assert "Traceback" not in done.stderr
     assert "residual: " in done.stdout
 
 

@@ -24,7 +24,7 @@ def test_cases_go_into_a_folder_once_and_a_rivals_file_is_judged_beside_ours(
     tmp_path: Path, capsys: pytest.CaptureFixture[str]
 ) -> None:
     folder = tmp_path / "cases"
-    words = ["bench", str(folder), "--drawn", "4", "--first-seed", "10", "--workers", "1"]
+    words = ["bench", str(folder), "--drawn", "2", "--first-seed", "10", "--workers", "1"]
     assert main(words) == 0
     cases = read_cases(folder)
     assert {each.truth for each in cases} == {"0", "1"}

@@ -3,6 +3,7 @@
 import time
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, replace
+from functools import cache
 from types import SimpleNamespace
 from typing import cast
 
@@ -114,10 +115,16 @@ def searched(monkeypatch: pytest.MonkeyPatch) -> Searched:
     return searched
 
 
-def search_of(library: Mapping[str, Effect], monkeypatch: pytest.MonkeyPatch, workers: int = 2) -> EffectSearch:
+@cache
+def recorded() -> Split:
+    """A recording that every search here is given: its fits are made by hand."""
     time_s: Column = np.asarray(0.01 * np.arange(1200), np.float64)
     position_m = 0.05 + 0.03 * np.sin(1.3 * time_s) + FLOOR_M * np.random.default_rng(1).standard_normal(1200)
-    parts = split([Recording({"time_s": time_s, "command_pa": 8e5 * position_m, "position_m": position_m})])
+    return split([Recording({"time_s": time_s, "command_pa": 8e5 * position_m, "position_m": position_m})])
+
+
+def search_of(library: Mapping[str, Effect], monkeypatch: pytest.MonkeyPatch, workers: int = 2) -> EffectSearch:
+    parts = recorded()
     of = Problem(parts.train.record, (), DYNAMIC, from_pressure=False, load_n=1.0)
     monkeypatch.setattr(effect_search, "problem", lambda *_, **__: of)
     return EffectSearch(parts, library, valve_with(), workers=workers, progress=lambda _what, _done: None)

@@ -34,7 +34,7 @@ def runs(seal: str, *bars: int) -> list[Recording]:
     return [read_imposed(DATA / "pneumatic_cylinder" / f"{seal}_{bar}bar.csv") for bar in bars]
 
 
-@pytest.fixture(scope="module", params=("O-ring", "NAPN"))
+@pytest.fixture(scope="module", params=few_always(["O-ring", "NAPN"]))
 def never_trained_on(request: pytest.FixtureRequest) -> tuple[str, ForceDiagnosis]:
     """Fitted at 1, 3 and 7 bar, judged at 5 bar."""
     seal = request.param

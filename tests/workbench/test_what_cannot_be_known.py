@@ -1,6 +1,7 @@
 """Records that cannot tell: each says what cannot be known, and nothing is named."""
 
 from collections.abc import Callable
+from functools import cache
 
 import numpy as np
 import pytest
@@ -8,10 +9,16 @@ import pytest
 from config.errors import InputError
 from config.recording import Column, Recording
 from tests.workbench.valves import NOISE_M, SEED
-from workbench.blind.hiding import hide
+from workbench.blind.hiding import Hidden, hide
 from workbench.diagnosis.diagnosis import diagnose
 
 Spoil = Callable[[dict[str, Column], Column], dict[str, Column]]
+
+
+@cache
+def hidden(seed: int) -> Hidden:
+    return hide(seed, duration_s=20.0)
+
 
 REFUSED: dict[str, tuple[Spoil, str]] = {
     "no slip": (lambda c, noise: {"position_m": 0.05 + noise}, "the stem moves 0 times"),
@@ -26,13 +33,13 @@ UNJUDGED: dict[str, tuple[Spoil, str]] = {
         lambda c, noise: {"position_m": 0.05 + 0.03 * np.sin(2.0 * np.pi * c["time_s"] / 3.0) + noise},
         "against its command",
     ),
-    "another command": (lambda c, _: {"command_pa": hide(308, duration_s=20.0).fit.command_pa}, "against its command"),
+    "another command": (lambda c, _: {"command_pa": hidden(308).fit.command_pa}, "against its command"),
     "clocks far apart": (lambda c, _: {"command_pa": np.roll(c["command_pa"], 70)}, "its command"),
 }
 
 
 def spoilt(spoil: Spoil) -> Recording:
-    columns = dict(hide(307, duration_s=20.0).fit.columns)
+    columns = dict(hidden(307).fit.columns)
     noise = NOISE_M * np.random.default_rng(1).standard_normal(len(columns["time_s"]))
     return Recording(columns | spoil(columns, noise))
 
@@ -53,10 +60,10 @@ def test_what_the_command_did_not_do_is_not_judged(case: str) -> None:
 
 
 def test_ten_bits_are_said_and_no_effect_is_named_for_them() -> None:
-    hidden = hide(307, duration_s=20.0, effects=0)
+    bare = hide(307, duration_s=20.0, effects=0)
     quantum_m = SEED.valve.stroke_m / 1024.0
-    columns = dict(hidden.fit.columns)
+    columns = dict(bare.fit.columns)
     rounded_m = quantum_m * np.round(columns["position_m"] / quantum_m)
-    found = diagnose(Recording(columns | {"position_m": rounded_m}), hidden.base, effects=("preload",), workers=1)
+    found = diagnose(Recording(columns | {"position_m": rounded_m}), bare.base, effects=("preload",), workers=1)
     assert found.missing == ()
     assert "is rounded to" in found.summary()
