@@ -22,7 +22,7 @@ from collections.abc import Callable
 from dataclasses import dataclass
 from threading import Semaphore
 
-from config.codes import GOOD, LOST, NO_NUMBER, REPEATED
+from config.codes import GOOD, LOST, NO_NUMBER, REPEATED, Quality
 from config.daemon_file import DaemonFile
 from config.quantities import ActionName, DeviceStatus
 from config.travel import Travel
@@ -206,8 +206,8 @@ class Link:
                 finally:
                     if door is not None:
                         door.release()
-            else:
-                self._sample = self._lost()
+            else:  # not asked: what was said last is why
+                self._sample = self._lost(NO_NUMBER if self._sample.quality is NO_NUMBER else LOST)
         except DriverError as error:
             self._lose(error)
         self._returned_s = awake_s()
@@ -404,9 +404,7 @@ class Link:
         kind = error.kind or type(error).__name__
         self._say(logging.WARNING, "no good reply", kind, reason=str(error))
         self._was_away = True
-        self._sample = self._lost()
-        if isinstance(error, NoNumber):
-            self._sample = self._sample._replace(quality=NO_NUMBER)
+        self._sample = self._lost(NO_NUMBER if isinstance(error, NoNumber) else LOST)
         refused = isinstance(error, Refused)
         if self._connected and (isinstance(error, NoNumber) or (refused and self._refusals < MOST_REFUSALS)):
             self._refusals += refused
@@ -416,11 +414,11 @@ class Link:
         now_s = awake_s()
         self._backoff.failed(now_s, now_s - self._asked_s)
 
-    def _lost(self) -> Sample:
+    def _lost(self, quality: Quality = LOST) -> Sample:
         now_s = self._pace.now_s(None)
         return self._sample._replace(
             now_s=now_s,
-            quality=LOST,
+            quality=quality,
             held_pa=None,
             overwritten=False,
             unattended_s=0.0,

@@ -86,6 +86,18 @@ def test_a_lost_reply_keeps_the_last_values_and_says_so() -> None:
     assert link.counts.lost_replies == 1
 
 
+def test_a_device_that_comes_back_without_a_number_is_no_silent_one_between_attempts(
+    monkeypatch: pytest.MonkeyPatch,
+) -> None:
+    """The fault changed with every attempt, some four times a second, and the journal with it."""
+    driver = Scripted(reading(1), NoConnection("gone"))
+    link, now_s = opened(driver), room.awake_s()
+    driver.shown = NoNumber("nan")
+    monkeypatch.setattr(room, "awake_s", lambda: now_s)
+    assert [link.exchange(5e4).quality for _ in range(9)] == [Quality.GOOD, Quality.LOST, *7 * (Quality.NO_NUMBER,)]
+    assert driver.opened < 7, "it is not asked in each cycle"
+
+
 @pytest.mark.parametrize(("lost", "begins"), [(2, True), (3, False)])
 def test_a_reply_lost_at_the_start_is_asked_for_again(lost: int, begins: bool, monkeypatch: pytest.MonkeyPatch) -> None:
     driver = Scripted()
