@@ -196,9 +196,10 @@ class Recording(Result):
         """Draw the position, and below it the command and the pressure, over time."""
         from config.results.drawing import MEASURED, MODEL, QUIET, legend, line, panels
 
-        figure, (above, below) = panels((3.0, 1.6))
-        time_s = self.time_s - self.time_s[0]
         length, command, travel = self.kind.length, self.kind.command, self.kind.travel.word
+        heights = {f"{travel}, {length.unit}": 3.0, f"{command.word}, {command.read.unit}": 1.6}
+        figure, (above, below) = panels(heights, "time, s")
+        time_s = self.time_s - self.time_s[0]
         if "reference_m" in self.columns:
             reference = length.factor * self.columns["reference_m"]
             line(above, time_s, reference, MODEL, "reference", drawstyle="steps-post")
@@ -207,9 +208,6 @@ class Recording(Result):
             line(below, time_s, command.read.factor * self.command_pa, QUIET, "command", drawstyle="steps-post")
         if "pressure_pa" in self.columns:
             line(below, time_s, command.read.factor * self.columns["pressure_pa"], MODEL, command.word)
-        above.set_ylabel(f"{travel}, {length.unit}")
-        below.set_ylabel(f"{command.word}, {command.read.unit}")
-        below.set_xlabel("time, s")
         legend(above)
         legend(below)
         return figure

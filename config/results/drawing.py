@@ -24,20 +24,22 @@ STEPS = ((1, 2, 5), (1, 1.5, 2, 3, 4, 5, 6, 7, 8, 9), (1, 1.2, 1.4, 1.6, 1.8, 2,
 """Where a decade has ticks, coarse to fine."""
 
 
-def panels(heights: Sequence[float]) -> "tuple[Figure, Sequence[Axes]]":
-    """Return a figure with panels one below the other, heights in inches, over one horizontal axis."""
+def panels(heights: Mapping[str, float], over: str) -> "tuple[Figure, Sequence[Axes]]":
+    """Return a figure with panels over one horizontal axis; their heights, inches, by what they show."""
     pyplot = import_extra("matplotlib.pyplot", "plot")
     figure, axes = pyplot.subplots(
         len(heights),
         sharex=True,
         squeeze=False,
-        figsize=(WIDTH_INCHES, sum(heights)),
-        height_ratios=heights,
+        figsize=(WIDTH_INCHES, sum(heights.values())),
+        height_ratios=list(heights.values()),
         layout="constrained",
     )
     pyplot.close(figure)
-    for each in axes[:, 0]:
+    for each, shown in zip(axes[:, 0], heights, strict=True):
         each.grid(alpha=0.3)
+        each.set_ylabel(shown)
+    axes[-1, 0].set_xlabel(over)
     return figure, list(axes[:, 0])
 
 
@@ -59,7 +61,7 @@ class Interval:
 
 def intervals(shown: Sequence[Interval], label: str) -> "tuple[Figure, Axes]":
     """Draw named values with their intervals, the first on top; what is infinite reaches the edge."""
-    figure, (axes,) = panels([0.9 + ROW_INCHES * len(shown)])
+    figure, (axes,) = panels({"": 0.9 + ROW_INCHES * len(shown)}, label)
     finite = [end for each in shown for end in (each.low, each.high) if np.isfinite(end)]
     low, high = (min(finite), max(finite)) if finite else (0.0, 1.0)
     margin = 0.1 * (high - low) or 1.0
@@ -70,7 +72,6 @@ def intervals(shown: Sequence[Interval], label: str) -> "tuple[Figure, Axes]":
         axes.plot(each.value, row, "o", color=each.colour, ms=6.0)
     axes.set_yticks(range(len(shown)), [each.name for each in reversed(shown)])
     axes.set_ylim(-0.7, len(shown) - 0.3)
-    axes.set_xlabel(label)
     return figure, axes
 
 
@@ -86,14 +87,13 @@ def race(errors: Mapping[str, float], chosen: Collection[str], marks: Mapping[st
     drawn = [(name, error) for name, error in errors.items() if np.isfinite(error) and error > 0.0]
     ordered = sorted(drawn, key=lambda each: -each[1])
     names = [name for name, _ in ordered]
-    figure, (axes,) = panels([1.1 + ROW_INCHES * len(names)])
+    figure, (axes,) = panels({"": 1.1 + ROW_INCHES * len(names)}, label)
     colours = [BETTER if name in chosen else FAINT for name in names]
     axes.scatter([error for _, error in ordered], names, color=colours, zorder=3)
     for (name, value), style in zip(marks.items(), (":", "--"), strict=False):
         axes.axvline(value, color=QUIET, ls=style, label=name)
     _logarithmic(axes, [*(error for _, error in ordered), *marks.values()])
     axes.set_ylim(-0.7, len(names) - 0.3)
-    axes.set_xlabel(label)
     legend(axes)
     return figure
 

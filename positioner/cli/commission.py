@@ -62,8 +62,7 @@ def run(arguments: argparse.Namespace) -> int:
         bounds = Settings.of(stranger).experiment
         found = commission(valve, file.valve.name, bounds, lambda said: print(f"  {said}", file=sys.stderr, flush=True))
     print(found.outcome.summary())
-    if arguments.json is not None:
-        write_json(arguments.json, found.outcome.as_json() | {"proposals": list(found.proposals)}, indent=1)
+    write_json(arguments.json, found.outcome.as_json() | {"proposals": list(found.proposals)}, indent=1)
     if arguments.keep is not None or not found.outcome.passed:
         kept(found.outcome, file, arguments, arguments.keep or "")
     if not found.proposals:

@@ -32,8 +32,7 @@ def run(arguments: argparse.Namespace) -> int:
     with naming(named), at_work("compare", f"holding {arguments.valve} against {arguments.recording}"):
         compared = compare(recording, valve)
     print(f"{arguments.valve} against {arguments.recording}: {compared.summary()}")
-    if arguments.json is not None:
-        write_json(arguments.json, compared)
+    write_json(arguments.json, compared)
     if arguments.report is not None:
         from workbench.report import Subject, report_comparison
 

@@ -75,7 +75,7 @@ def run(arguments: argparse.Namespace) -> int:
     from workbench.data.imposed_motion import is_imposed
     from workbench.diagnosis.diagnosis import diagnose
     from workbench.diagnosis.diagnosis_json import as_json
-    from workbench.report import Subject, report_diagnosis, require_plotly
+    from workbench.report import Subject, report_diagnosis
 
     for option in ("experiment", "out"):
         writable(getattr(arguments, option), f"--{option}")
@@ -84,8 +84,6 @@ def run(arguments: argparse.Namespace) -> int:
         from positioner.cli.parts.diagnose_forces import run_forces
 
         return run_forces(arguments)
-    if arguments.report is not None:
-        require_plotly(arguments.report)
     began_s, budget_s = time.monotonic(), inf if arguments.budget_s is None else arguments.budget_s
     valve = read_valve(arguments.valve)
     require_effects(arguments.effects, "--effects")

@@ -5,7 +5,6 @@ from pathlib import Path
 from typing import TYPE_CHECKING
 
 from config.errors import InputError
-from config.extras import import_extra
 from positioner.cli.parts.fit_arguments import add_noise_and_exports, add_pressure, add_test, read_fitted
 from positioner.cli.parts.model_arguments import read_valve
 from positioner.cli.parts.naming import files_named, naming
@@ -42,8 +41,6 @@ def run(arguments: argparse.Namespace) -> int:
     from workbench.discover.discovery_json import as_json
 
     _require_new(arguments.out)
-    if arguments.picture is not None:
-        import_extra("matplotlib.pyplot", "--picture")
     valve = read_valve(arguments.valve)
     recordings, test = read_fitted(arguments.recordings, arguments, valve)
     named = files_named(arguments.recordings, arguments.test, arguments.valve)
@@ -62,8 +59,7 @@ def run(arguments: argparse.Namespace) -> int:
     if arguments.picture is not None and found.outcome not in {"explained", "unjudged"}:
         found.plot().savefig(arguments.picture, dpi=120)
         print(f"{arguments.picture}: what it adds, and what the landings miss")
-    if arguments.json is not None:
-        write_json(arguments.json, as_json(found))
+    write_json(arguments.json, as_json(found))
     return 1 if found.outcome in {"none", "unjudged"} else 0
 
 

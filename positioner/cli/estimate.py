@@ -45,8 +45,7 @@ def run(arguments: argparse.Namespace) -> int:
     with naming({"noise_std_m": "--noise-m"}), at_work("estimate", what):
         estimated = estimate(recording, noise_std_m=arguments.noise_m, pressure_held=held)
     print(f"{arguments.recording}: {estimated.summary()}")
-    if arguments.json is not None:
-        write_json(arguments.json, as_json(estimated), indent=1)
+    write_json(arguments.json, as_json(estimated), indent=1)
     return 0 if estimated.law_ready else 1
 
 

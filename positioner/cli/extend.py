@@ -40,11 +40,9 @@ def run(arguments: argparse.Namespace) -> int:
     from workbench.diagnosis.extension import extend
     from workbench.diagnosis.extension_journal import Journal, write_extended
     from workbench.diagnosis.extension_json import as_json
-    from workbench.report import report_journal, require_plotly
+    from workbench.report import report_journal
 
     writable(arguments.out, "-o")
-    if arguments.report is not None:
-        require_plotly(arguments.report)
     began_s = time.monotonic()
     path = find_valve(arguments.valve)
     valve = read_valve(arguments.valve)

@@ -6,7 +6,6 @@ from pathlib import Path
 from typing import TYPE_CHECKING
 
 from config.errors import InputError
-from config.extras import import_extra
 
 if TYPE_CHECKING:
     from workbench.fleet.examination import Examination
@@ -43,16 +42,11 @@ def run(arguments: argparse.Namespace) -> int:
     from workbench.fleet.fleet import at, fleet
     from workbench.fleet.fleet_report import report_fleet
     from workbench.fleet.tables import write_tables
-    from workbench.report import require_plotly
 
-    if arguments.picture is not None:
-        import_extra("matplotlib.pyplot", "--picture")
-        if arguments.since is None:
-            raise InputError("--picture", "draws what changed since a date: give it as --since DATE")
+    if arguments.picture is not None and arguments.since is None:
+        raise InputError("--picture", "draws what changed since a date: give it as --since DATE")
     if arguments.diagnoses < 0:
         raise InputError("--diagnoses", f"must be 0 or more, got {arguments.diagnoses}")
-    if arguments.report is not None and arguments.diagnoses:
-        require_plotly(arguments.report)
     since = at(arguments.since, "--since") if arguments.since else None
     if arguments.workers is not None and arguments.workers < 1:
         raise InputError("--workers", f"must be 1 or more, got {arguments.workers}")

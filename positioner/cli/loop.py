@@ -27,10 +27,7 @@ def run(arguments: argparse.Namespace) -> int:
     from workbench.loops import diagnose_loop
     from workbench.loops.joint import together
     from workbench.loops.loop_report import report_loop
-    from workbench.report import require_plotly
 
-    if arguments.report is not None:
-        require_plotly(arguments.report)
     found = []
     for path in arguments.recording:
         record = read_record(path, arguments)

@@ -27,18 +27,14 @@ def run(arguments: argparse.Namespace) -> int:
     """Print the ranking; 1 if any valve sticks, else 0."""
     from workbench.loops.loop_report import report_loops
     from workbench.loops.plant import diagnose_plant, read_manifest
-    from workbench.report import require_plotly
 
-    if arguments.report is not None:
-        require_plotly(arguments.report)
     if arguments.workers is not None and arguments.workers < 1:
         raise InputError("--workers", f"must be 1 or more, got {arguments.workers}")
     entries = read_manifest(arguments.manifest)
     plant = diagnose_plant(
         entries, arguments.workers, lambda each: print(each.sentence, file=sys.stderr, flush=True), arguments.out
     )
-    if arguments.json is not None:
-        write_json(arguments.json, [each.as_json() for each in plant.ranked])
+    write_json(arguments.json, [each.as_json() for each in plant.ranked])
     if arguments.report is not None:
         report_loops(plant, arguments.report, arguments.manifest.name)
     print(as_text([plant.ranking]))

@@ -28,7 +28,6 @@ def run(arguments: argparse.Namespace) -> int:
     recording = read_any(arguments.recording, arguments, None)
     with at_work("response", f"finding the steps of {len(recording)} samples"):
         response = respond(recording)
-    if arguments.json is not None:
-        write_json(arguments.json, as_json(response))
+    write_json(arguments.json, as_json(response))
     print(f"{arguments.recording}: {response.summary()}")
     return 0 if response.steps else 1

@@ -140,7 +140,7 @@ class ResponseFigures(Result):
         from config.results.drawing import BETTER, MEASURED, MODEL, legend, panels
 
         scale, unit = self._input_unit
-        figure, (axes,) = panels((4.0,))
+        figure, (axes,) = panels({"time, s": 4.0}, f"step of {self.input}, {unit}")
         for (label, name), colour in zip(TIMES, (MEASURED, MODEL, BETTER), strict=True):
             told = [(scale * each.size, getattr(each, name)) for each in self.steps]
             shown = [(size, time) for size, time in told if time.value is not None]
@@ -152,8 +152,6 @@ class ResponseFigures(Result):
                 color=colour,
                 label=label,
             )
-        axes.set_xlabel(f"step of {self.input}, {unit}")
-        axes.set_ylabel("time, s")
         legend(axes)
         return figure
 

@@ -218,6 +218,6 @@ class Outcome(Result):
 
         if self.picture is None:
             raise ValueError(f"the {self.test} has no picture")
-        figure, (axes,) = panels((5.0,))
+        figure, (axes,) = panels({self.picture.y: 5.0}, self.picture.x)
         self.picture.draw(axes)
         return figure

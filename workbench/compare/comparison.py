@@ -176,16 +176,13 @@ class Comparison(Result):
         """Draw the position measured and simulated, and below it the error, over time."""
         from config.results.drawing import MEASURED, MODEL, legend, line, panels
 
-        figure, (above, below) = panels((3.2, 1.6))
-        time_s = self.time_s - self.time_s[0]
-        length = self.own.length
+        time_s, length = self.time_s - self.time_s[0], self.own.length
+        heights = {f"{self.own.travel.word}, {length.unit}": 3.2, f"error, {length.unit}": 1.6}
+        figure, (above, below) = panels(heights, "time, s")
         line(above, time_s, length.factor * self.measured_m, MEASURED, "measured")
         label = f"model, error {length.said(self.rms_m, '.4g')} rms"
         line(above, time_s, length.factor * self.simulated_m, MODEL, label)
         line(below, time_s, length.factor * self.residual_m, MODEL)
-        above.set_ylabel(f"{self.own.travel.word}, {length.unit}")
-        below.set_ylabel(f"error, {length.unit}")
-        below.set_xlabel("time, s")
         legend(above)
         return figure
 

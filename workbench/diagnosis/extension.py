@@ -110,7 +110,7 @@ class Extension(Result):
         from config.results.drawing import BETTER, MODEL, legend, line, panels
 
         part, length = self.split.test, self.extended.kind.length
-        figure, (axes,) = panels((4.0,))
+        figure, (axes,) = panels({f"error on held-out data, {length.unit}": 4.0}, "time, s")
         for name, found, errors, colour in (
             ("refitted, nothing added", self.refitted, self.refitted_errors, MODEL),
             *([(self.named, self.extended, self.extended_errors, BETTER)] if self.effects else []),
@@ -118,8 +118,6 @@ class Extension(Result):
             error_m = residual_m(part, found.indicated_m(part.record))
             label = f"{name}: {length.said(errors.test_rmse_m)} rms"
             line(axes, part.record.time_s - part.record.time_s[0], length.factor * error_m, colour, label)
-        axes.set_xlabel("time, s")
-        axes.set_ylabel(f"error on held-out data, {length.unit}")
         legend(axes)
         return figure
 

@@ -101,9 +101,8 @@ class Discovery(Result):
         """Draw what the best form adds over its variable, and what the landings miss where it is a force at rest."""
         from config.results.drawing import BETTER, MEASURED, MODEL, QUIET, legend, line, panels
 
-        figure, (axes,) = panels((4.0,))
+        figure, (axes,) = panels({"": 4.0}, "position, of the stroke")
         if not self.found:
-            axes.set_xlabel("position, of the stroke")
             self._draw_landings(axes, {1.0: MEASURED, -1.0: MODEL})
         for each, colour in zip(self.found[:1], (BETTER,), strict=False):
             added = each.added

@@ -160,13 +160,11 @@ class Discrimination(Result):
         """Draw the odds of each rival against the best, experiment by experiment."""
         from config.results.drawing import MEASURED, legend, line, panels
 
-        figure, (axes,) = panels((3.0,))
+        figure, (axes,) = panels({"odds against the best": 3.0}, "moves")
         moves = np.array([each.moves for each in self.rounds], dtype=np.float64)
         for name in (each[0] for each in self.rivals):
             line(axes, moves, np.array([each.odds[name] for each in self.rounds]), MEASURED, name)
         axes.set_yscale("log")
-        axes.set_xlabel("moves")
-        axes.set_ylabel("odds against the best")
         legend(axes)
         return figure
 

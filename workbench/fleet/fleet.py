@@ -99,11 +99,9 @@ class Fleet(Result):
         """Draw how far each complaining valve is off, in the order of the ranking."""
         from config.results.drawing import MEASURED, line, panels
 
-        figure, (axes,) = panels((3.2,))
+        figure, (axes,) = panels({"off by, % of stroke": 3.2}, "rank")
         shares = [100.0 * each.cost_share for each in self.complaining]
         line(axes, list(range(1, len(shares) + 1)), shares, MEASURED)
-        axes.set_xlabel("rank")
-        axes.set_ylabel("off by, % of stroke")
         return figure
 
 

@@ -85,7 +85,9 @@ class ModelChanges(Result):
         from config.results.drawing import BETTER, MODEL, ROW_INCHES, panels
 
         drawn = self.changes[:MOST_DRAWN]
-        figure, (axes,) = panels((1.2 + ROW_INCHES * max(len(drawn), 1),))
+        more = f", the first {MOST_DRAWN} of {len(self.changes)}" if len(self.changes) > MOST_DRAWN else ""
+        over = f"change since {self.since:%Y-%m-%d}, % of what it was{more}"
+        figure, (axes,) = panels({"": 1.2 + ROW_INCHES * max(len(drawn), 1)}, over)
         for row, each in enumerate(reversed(drawn)):
             new = each.percent is None
             percent = LONGEST_PERCENT if each.percent is None else each.percent
@@ -108,8 +110,6 @@ class ModelChanges(Result):
         axes.set_yticks(range(len(drawn)), [f"{each.valve}  {each.name}" for each in reversed(drawn)])
         axes.set_xlim(-1.1 * LONGEST_PERCENT, 1.1 * LONGEST_PERCENT)
         axes.set_ylim(-0.7, max(len(drawn), 1) - 0.3)
-        more = f", the first {MOST_DRAWN} of {len(self.changes)}" if len(self.changes) > MOST_DRAWN else ""
-        axes.set_xlabel(f"change since {self.since:%Y-%m-%d}, % of what it was{more}")
         return figure
 
 

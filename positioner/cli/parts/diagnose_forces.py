@@ -15,15 +15,13 @@ def run_forces(arguments: argparse.Namespace) -> int:
     from workbench.data.imposed_motion import read_imposed
     from workbench.forces.force_diagnosis import diagnose_forces
     from workbench.forces.force_diagnosis_json import as_json
-    from workbench.report import Subject, report_forces, require_plotly
+    from workbench.report import Subject, report_forces
 
     if arguments.effects is not None:
         raise InputError("--effects", "goes with recordings that hold a command; here the position is imposed")
     for name in ("from_s", "to_s", "noise_m"):
         if getattr(arguments, name) is not None:
             raise InputError(f"--{name.replace('_', '-')}", "goes with recordings that hold a command")
-    if arguments.report is not None:
-        require_plotly(arguments.report)
     began_s = time.monotonic()
     valve = read_valve(arguments.valve)
     recordings = [read_imposed(path) for path in arguments.recordings]

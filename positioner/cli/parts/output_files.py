@@ -1,7 +1,8 @@
 """What a command writes because an option asks for it: `--out` a folder, `--json` a file.
 
 A path that cannot be written is bad input: one line that names the option, before the work begins (`writable`) where it
-can be known. So is one that the same command reads, whose only copy would be gone. `check_outputs` sees to both.
+can be known. So is one that the same command reads, whose only copy would be gone, and one that is drawn by a package
+which is not installed. `check_outputs` sees to all of them.
 """
 
 import argparse
@@ -12,10 +13,13 @@ from collections.abc import Iterator, Mapping
 from pathlib import Path
 
 from config.errors import InputError
+from config.extras import import_extra
 from config.whole_file import beside
 
 OPTIONS: Mapping[str, str] = {"out": "-o", "json": "--json", "report": "--report", "picture": "--picture"}
 """By which files are written, by their names among a command's arguments."""
+DRAWN_BY: Mapping[str, str] = {"report": "plotly", "picture": "matplotlib.pyplot"}
+"""The package that draws into a file, of those that need one."""
 
 
 def check_outputs(arguments: argparse.Namespace) -> None:
@@ -23,11 +27,14 @@ def check_outputs(arguments: argparse.Namespace) -> None:
 
     Raises:
         InputError: names the option and the file.
+        ModuleNotFoundError: what draws it is not installed; names the option and the extra.
     """
     said = vars(arguments)
     written = {name: said[name] for name in OPTIONS if isinstance(said.get(name), Path)}
     read = [path for name, value in said.items() if name not in written for path in _files(value)]
     for name, path in written.items():
+        if name in DRAWN_BY:
+            import_extra(DRAWN_BY[name], OPTIONS[name])
         if name != "out":  # which may be a folder, yet to be made
             writable(path, OPTIONS[name])
         if path.is_file() and any(path.samefile(each) for each in read):
@@ -87,15 +94,16 @@ def recording_writable(path: Path, option: str) -> None:
     require_recording_name(path)
 
 
-def write_json(path: Path, values: object, indent: int | None = None) -> None:
-    """Write a result, on one line unless it is indented; null for what is no finite number.
+def write_json(path: Path | None, values: object, indent: int | None = None) -> None:
+    """Write a result, where `--json` names a file, on one line unless indented; null for what is no finite number.
 
     Raises:
         InputError: it cannot be written.
     """
     from config.json_value import json_value
 
-    write_text(path, json.dumps(json_value(values), indent=indent, allow_nan=False) + "\n", "--json")
+    if path is not None:
+        write_text(path, json.dumps(json_value(values), indent=indent, allow_nan=False) + "\n", "--json")
 
 
 def write_text(path: Path, text: str, option: str) -> None:

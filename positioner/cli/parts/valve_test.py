@@ -196,8 +196,7 @@ def finished(
     if file is not None and compared:
         outcome, changed = _compared(outcome, reference_of(outcome.test, file, arguments))
     print(outcome.summary())
-    if arguments.json is not None:
-        write_json(arguments.json, outcome.as_json() | {"compared": [_change(each) for each in changed]}, indent=1)
+    write_json(arguments.json, outcome.as_json() | {"compared": [_change(each) for each in changed]}, indent=1)
     if arguments.picture is not None:
         draw(outcome, arguments.picture)
     if file is not None and (arguments.keep is not None or always_kept):
