@@ -14,6 +14,7 @@ from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass, field, replace
 from datetime import UTC, datetime
 from html import escape
+from textwrap import fill
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
@@ -42,6 +43,11 @@ MARK = (
     f"* differs from the recommended figure by more than {THRESHOLDS.off:.0%} (an end: {THRESHOLDS.worth_of_span:.0%} "
     f"of travel or bench set's span), and by more than {THRESHOLDS.changed_sigmas:.0f} standard deviations"
 )
+UNCHANGED = "no change of a figure points to a cause"
+PROSE = 130
+"""Letters in a line of a PDF."""
+MOST_PT, ACROSS_PT, DOWN_PT = 8.0, 1150.0, 430.0
+"""Size of letters in a PDF: at the most, by the widest line's letters, and by the lines, for which a page has room."""
 WIDTH, HEIGHT, EDGE = 640, 300, 56
 """Of a picture, in its own units."""
 INKS = {"as_found": ("#d9622b", "#e8a27f"), "as_left": ("#1b7f79", "#7db8b4"), "factory": ("#5b6675", "#9aa4b1")}
@@ -137,6 +143,26 @@ class ValveReport:
                             shown.setdefault(f"{TITLES[after.kind]}: {each.means}", []).append(f"{test}: {told}")
         return [f"{means} ({'; '.join(figures)})" for means, figures in shown.items()]
 
+    def heading(self) -> str:
+        """Return how the report is to be read."""
+        return (
+            f"written {datetime.now(UTC):%Y-%m-%d %H:%M} UTC; every ± is two standard deviations or half an interval; "
+            f"a figure that cannot be determined has its reason; {MARK}"
+        )
+
+    def when(self, test: str) -> str:
+        """Return when the records of a test were made."""
+        return "; ".join(each.told for each in self.kept(test).values())
+
+    def notes(self, test: str) -> list[str]:
+        """Return the notes of a test's records, with whose each is where it is not that of all."""
+        kept = self.kept(test)
+        told: dict[str, list[str]] = {}
+        for kind, record in kept.items():
+            for note in dict.fromkeys(record.outcome.notes):
+                told.setdefault(note, []).append(TITLES[kind])
+        return [note if len(kinds) == len(kept) else f"{', '.join(kinds)}: {note}" for note, kinds in told.items()]
+
     def _recommended(self, quantity: Quantity) -> Figure:
         """Return what a figure should be; without a value where nobody says."""
         if quantity.name in self._factory.keys() - self.recommended.keys():
@@ -176,11 +202,9 @@ def recommended_by(file: DaemonFile) -> dict[str, float]:
 
 def as_html(report: ValveReport) -> str:
     """Return the report as one page."""
-    now = datetime.now(UTC)
     title = f"Valve {report.valve}: as found and as left"
     parts = [
-        f"<h1>{escape(title)}</h1><p class='quiet'>written {now:%Y-%m-%d %H:%M} UTC; every ± is two standard deviations"
-        f" or half an interval; a figure that cannot be determined has its reason; {MARK}</p>",
+        f"<h1>{escape(title)}</h1><p class='quiet'>{escape(report.heading())}</p>",
         _findings(report),
         *(_section(report, each) for each in report.tests()),
         f"<section><h2>Configuration</h2><pre>{escape(_lines(report.configuration))}</pre></section>",
@@ -208,9 +232,11 @@ def write_pdf(report: ValveReport, path: "Path") -> None:
         import_extra("matplotlib.backends.backend_pdf", "report"),
     )
     with pages.PdfPages(path) as pdf:
-        _page(figures, pdf, f"Valve {report.valve}: what has changed", "\n".join(report.findings()))
+        changed = _prose(report.heading(), "", *(report.findings() or [UNCHANGED]))
+        _page(figures, pdf, f"Valve {report.valve}: what has changed", changed)
         for test in report.tests():
-            texts = [as_text([report.table(test)]), *(as_text([each]) for each in report.changed(test))]
+            tables = (as_text([each]) for each in (report.table(test), *report.changed(test)))
+            texts = [_prose(report.when(test)), *tables, _prose(*report.notes(test))]
             _page(figures, pdf, f"Valve {report.valve}: {test}", "\n\n".join(texts))
             pictures = [
                 (kind, each.outcome.picture) for kind, each in report.kept(test).items() if each.outcome.picture
@@ -231,30 +257,31 @@ def write_pdf(report: ValveReport, path: "Path") -> None:
         )
 
 
+def _prose(*lines: str) -> str:
+    return "\n".join(fill(each, PROSE, subsequent_indent="    ") for each in lines)
+
+
 def _page(figures: Any, pdf: Any, title: str, text: str) -> None:
     figure = figures.Figure(figsize=(11.7, 8.3))
     figure.text(0.04, 0.95, title, fontsize=13, weight="bold", va="top")
     widest = max((len(each) for each in text.splitlines()), default=1)
-    size = min(8.0, 1150.0 / max(widest, 1), 480.0 / max(1, text.count("\n") + 1) * 1.1)
+    size = min(MOST_PT, ACROSS_PT / max(widest, 1), DOWN_PT / (text.count("\n") + 1))
     figure.text(0.04, 0.90, text, fontsize=size, family="monospace", va="top")
     pdf.savefig(figure)
 
 
 def _findings(report: ValveReport) -> str:
-    told = report.findings() or ["no change of a figure points to a cause"]
-    lines = "".join(f"<li>{escape(each)}</li>" for each in told)
+    lines = "".join(f"<li>{escape(each)}</li>" for each in report.findings() or [UNCHANGED])
     return f"<section><h2>What has changed</h2><ul>{lines}</ul></section>"
 
 
 def _section(report: ValveReport, test: str) -> str:
-    when = "; ".join(each.told for each in report.kept(test).values())
-    notes = dict.fromkeys(note for each in report.kept(test).values() for note in each.outcome.notes)
     return (
-        f"<section><h2>{escape(test.capitalize())}</h2><p class='quiet'>{escape(when)}</p>"
+        f"<section><h2>{escape(test.capitalize())}</h2><p class='quiet'>{escape(report.when(test))}</p>"
         + _html_table(report.table(test))
         + "".join(f"<p><b>{escape(each.title)}</b></p>{_html_table(each)}" for each in report.changed(test))
         + _svg({kind: each.outcome.picture for kind, each in report.kept(test).items()})
-        + "".join(f"<p class='quiet'>{escape(each)}</p>" for each in notes)
+        + "".join(f"<p class='quiet'>{escape(each)}</p>" for each in report.notes(test))
         + "</section>"
     )
 

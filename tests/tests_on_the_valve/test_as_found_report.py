@@ -3,10 +3,13 @@
 import re
 from collections.abc import Iterator
 from contextlib import contextmanager
+from dataclasses import replace
 from html.parser import HTMLParser
 from pathlib import Path
 
 import pytest
+from matplotlib.backends.backend_pdf import PdfPages
+from matplotlib.figure import Figure as Drawn
 
 from config.codes import ValveTestVerdict
 from positioner.cli.main import main
@@ -30,7 +33,11 @@ STROKES = Outcome(
     (ValveTestVerdict.PASSED,),
 )
 LAW: dict[str, float] = {"b_over_c_pa_per_m": -2e6, "k_over_c_pa": -6000.0, "offset_pa": 20e3}
-CONFIGURATION = {"valve": {"name": "FV-1", "stroke_m": STROKE_M}, "law": LAW}
+CONFIGURATION = {
+    "valve": {"name": "FV-1", "stroke_m": STROKE_M},
+    "law": LAW,
+    "device": {f"key_{number}": 0.0 for number in range(45)},
+}
 SITE = f"[valve]\nname = 'FV-1'\nstroke_m = {STROKE_M}\n[law]\nb_over_c_pa_per_m = -2e6\nk_over_c_pa = -6000.0\n"
 
 
@@ -100,9 +107,25 @@ def test_every_column_that_tables_of_plants_have_is_there_with_its_plus_minus(si
 
 
 @pytest.mark.long
-def test_a_pdf_has_a_page_for_each(site: Path, tmp_path: Path) -> None:
-    out = tmp_path / "FV-1.pdf"
+def test_a_pdf_has_a_page_for_each_with_all_its_words_on_it(
+    site: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    out, drawn, words = tmp_path / "FV-1.pdf", PdfPages.savefig, []
+
+    def looked_at(pages: PdfPages, figure: Drawn) -> None:
+        drawn(pages, figure)
+        for each in figure.texts:
+            words.append(each.get_text())
+            box, page = each.get_window_extent(), figure.bbox
+            assert page.x0 <= box.x0 < box.x1 <= page.x1, each.get_text()
+            assert page.y0 <= box.y0 < box.y1 <= page.y1, each.get_text()
+
+    monkeypatch.setattr(PdfPages, "savefig", looked_at)
     assert main(["report", str(site), "-o", str(out)]) == 0
+    told = "\n".join(words)
+    assert "packing loose or worn" in told
+    assert told.count("tested by") == told.count("accepted by") == 1
+    assert "two standard deviations" in told
     pages = re.findall(rb"/Type /Page\b", out.read_bytes())
     assert len(pages) == 5, "what has changed, signature and its pictures, commissioning, configuration"
 
@@ -128,6 +151,12 @@ def test_bad_input_is_one_line(site: Path, tmp_path: Path, capsys: pytest.Captur
         assert "is no record of a test on the valve" in capsys.readouterr().err
     finally:
         broken.unlink()
+
+
+def test_a_note_says_whose_it_is_where_it_is_not_of_all(tmp_path: Path) -> None:
+    for number, (kind, notes) in enumerate({"factory": ("no reference", "slow"), "as_found": ("slow",)}.items(), 1):
+        keep(tmp_path, replace(STROKES, notes=notes), kind, number * 1e9, {})
+    assert ValveReport("FV-1", records(tmp_path)).notes("commissioning") == ["slow", "factory: no reference"]
 
 
 def test_a_report_of_what_was_found_alone_has_one_column(tmp_path: Path) -> None:
