@@ -1,7 +1,7 @@
 """The report as found and as left: every column that tables of plants have, with its +-; what changed; its pictures."""
 
 import re
-from collections.abc import Iterator
+from collections.abc import Callable, Iterator
 from contextlib import contextmanager
 from dataclasses import replace
 from html.parser import HTMLParser
@@ -110,7 +110,8 @@ def test_every_column_that_tables_of_plants_have_is_there_with_its_plus_minus(si
 def test_a_pdf_has_a_page_for_each_with_all_its_words_on_it(
     site: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    out, drawn, words = tmp_path / "FV-1.pdf", PdfPages.savefig, []
+    out, words = tmp_path / "FV-1.pdf", list[str]()
+    drawn: Callable[..., None] = PdfPages.savefig
 
     def looked_at(pages: PdfPages, figure: Drawn) -> None:
         drawn(pages, figure)
