@@ -76,23 +76,29 @@ def test_a_read_only_disk_is_one_line_before_anything_is_commanded(tmp_path: Pat
     folder = tmp_path / "disk"
     folder.mkdir()
     with running("sim", slave_file(tmp_path), "--listen-port", "0") as slave:
-        for kept in KEPT:
-            config = daemon_file(tmp_path, port_in(slave), f"[{kept}]\nfolder = 'disk/kept'\n", PATIENT)
-            words = f"{sys.executable} -m positioner.cli run {config}"
-            said = on_read_only(folder, words)
+        configs = [
+            daemon_file(tmp_path, port_in(slave), f"[{kept}]\nfolder = 'disk/kept'\n", PATIENT).rename(
+                tmp_path / f"{kept}.toml"
+            )
+            for kept in KEPT
+        ]
+        for said in refused_on_read_only(folder, configs):
             assert "disk/kept" in said
             assert "Read-only file system" in said
 
 
-def on_read_only(folder: Path, words: str) -> str:
-    """Return the one line that a command says when it is refused, the folder being on a disk that takes nothing."""
+def refused_on_read_only(folder: Path, configs: list[Path]) -> list[str]:
+    """Return the line that each daemon says when it is refused, the folder being on a disk that takes nothing."""
     if shutil.which("unshare") is None:
         pytest.skip("needs util-linux")
-    mounted = f"mount -t tmpfs -o ro tmpfs {folder} && exec {words}"
-    command = ["unshare", "-Urm", "sh", "-c", mounted]
+    refused = "{main(['run', each]) for each in sys.argv[1:]} == {2}"
+    script = f"import sys; from positioner.cli.main import main; sys.exit(not {refused})"
+    mounted = 'mount -t tmpfs -o ro tmpfs "$0" && exec "$@"'
+    command = ["unshare", "-Urm", "sh", "-c", mounted, str(folder), sys.executable, "-c", script, *map(str, configs)]
     done = subprocess.run(command, capture_output=True, text=True, timeout=90, check=False)
     if "unshare:" in done.stderr or "mount:" in done.stderr:
         pytest.skip(f"may not mount: {done.stderr.strip()}")
-    assert done.returncode == 2
-    (line,) = (each for each in done.stderr.splitlines() if not each.startswith("{"))
-    return line
+    assert done.returncode == 0, "each ends with status 2"
+    lines = [each for each in done.stderr.splitlines() if not each.startswith("{")]
+    assert len(lines) == len(configs), done.stderr
+    return lines
