@@ -39,14 +39,17 @@ def play() -> ValveFile:
     return ValveFile.model_validate({"valve": valve("seed").valve.model_dump(), "effect": [PLAY]})
 
 
-def plant(folder: Path) -> Path:
-    """A valve that is well, one whose packing was tightened, one with play, one with a recording of garbage."""
+def plant(folder: Path, *, alike: bool = False) -> Path:
+    """A valve that is well, one whose packing was tightened, one with play, one with a recording of garbage.
+
+    Where they were alike in January it is to the byte: one diagnosis then serves all four.
+    """
     well = valve("seed")
     tight = well.model_copy(update={"valve": well.valve.model_copy(update=TIGHTER)})
     write_valve(folder / "seed.toml", well)
     rows = []
     for number, (name, autumn) in enumerate({"well": well, "tight": tight, "play": play(), "bad": well}.items()):
-        record(well, folder / "recordings" / f"{name}-1.csv", 2 * number)
+        record(well, folder / "recordings" / f"{name}-1.csv", 0 if alike else 2 * number)
         record(autumn, folder / "recordings" / f"{name}-2.csv", 2 * number + 1)
         rows += [f"{name},seed.toml,recordings/{name}-{i}.csv,2026-0{i}-01\n" for i in (1, 2)]
     (folder / "recordings" / "bad-2.csv").write_text("no recording\n")

@@ -33,7 +33,7 @@ def without_dask(monkeypatch: pytest.MonkeyPatch) -> None:
 
 @pytest.fixture(scope="module")
 def site(tmp_path_factory: pytest.TempPathFactory) -> Path:
-    return plant(tmp_path_factory.mktemp("plant"))
+    return plant(tmp_path_factory.mktemp("plant"), alike=True)
 
 
 @pytest.fixture(scope="module")
