@@ -1,6 +1,7 @@
 """Files and arguments that somebody else gave: one line that names file, key, value and what is allowed; never more."""
 
 import os
+import sys
 from collections.abc import Callable
 from pathlib import Path
 
@@ -166,6 +167,32 @@ def test_an_output_that_is_the_input_is_refused_and_left_as_it_was(
         assert main(words) == 2
         assert capsys.readouterr().err.startswith(f"positioner {words[0]}: {said}")
     assert Path("in.csv").read_text() == text
+
+
+@pytest.mark.parametrize(
+    ("words", "module", "said"),
+    [
+        (["compare", "in.csv", "--valve", "seed", "--report", "a.html"], "plotly", "--report a.html: it needs plotly"),
+        (["diagnose", "in.csv", "--valve", "seed", "--report", "a.html"], "plotly", "--report a.html: it needs plotly"),
+        (
+            ["discover", "in.csv", "--valve", "seed", "--picture", "a.png"],
+            "matplotlib.pyplot",
+            "--picture a.png: it needs matplotlib",
+        ),
+    ],
+)
+def test_what_draws_an_output_is_asked_for_before_the_input_is_read(
+    words: list[str],
+    module: str,
+    said: str,
+    tmp_path: Path,
+    monkeypatch: pytest.MonkeyPatch,
+    capsys: pytest.CaptureFixture[str],
+) -> None:
+    monkeypatch.chdir(tmp_path)
+    monkeypatch.setitem(sys.modules, module, None)
+    assert main(words) == 2
+    assert capsys.readouterr().err.startswith(f"positioner {words[0]}: {said}, which is not installed: pip install")
 
 
 def test_what_a_library_says_in_lines_or_at_length_is_one_line_of_bounded_length(tmp_path: Path) -> None:

@@ -26,15 +26,14 @@ def check_outputs(arguments: argparse.Namespace) -> None:
     """Refuse an output that cannot be written, or is an input or another output of the command; of any command.
 
     Raises:
-        InputError: names the option and the file.
-        ModuleNotFoundError: what draws it is not installed; names the option and the extra.
+        InputError: names the option and the file, and the extra where what draws it is not installed.
     """
     said = vars(arguments)
     written = {name: said[name] for name in OPTIONS if isinstance(said.get(name), Path)}
     read = [path for name, value in said.items() if name not in written for path in _files(value)]
     for name, path in written.items():
         if name in DRAWN_BY:
-            import_extra(DRAWN_BY[name], OPTIONS[name])
+            _require_drawing(DRAWN_BY[name], f"{OPTIONS[name]} {path}")
         if name != "out":  # which may be a folder, yet to be made
             writable(path, OPTIONS[name])
         if path.is_file() and any(path.samefile(each) for each in read):
@@ -43,6 +42,13 @@ def check_outputs(arguments: argparse.Namespace) -> None:
         if alike != name and (path.is_file() or not path.exists()):
             problem = f"is written by {OPTIONS[alike]} as well; allowed is another file"
             raise InputError(f"{OPTIONS[name]} {path}", problem)
+
+
+def _require_drawing(module: str, output: str) -> None:
+    try:
+        import_extra(module, "it")
+    except ModuleNotFoundError as error:
+        raise InputError(output, str(error)) from None
 
 
 def _files(value: object) -> Iterator[Path]:
