@@ -179,6 +179,23 @@ def test_a_model_that_has_changed_and_a_test_that_is_overdue_are_told() -> None:
     assert panel.get("alarms_active") == 0.0
 
 
+def test_a_limit_that_is_passed_at_a_restart_stays_raised_for_its_delay() -> None:
+    """Else an alarm that somebody has acknowledged or shelved would return, and be raised anew."""
+    _, sample, decision = in_automatic()
+    alarms = AlarmsTable.model_validate({"high": {"threshold": 0.6, "delay_s": 30.0}})
+    before, after = (Health(HealthSettings.of(HealthTable(), 0.1016, alarms=alarms)) for _ in range(2))
+
+    def looked(health: Health, opening: float, now_s: float) -> set[Ne107Cause]:
+        health.look(sample._replace(position_m=opening * 0.1016, now_s=now_s), decision, now_s)
+        return set(health.conditions)
+
+    assert looked(before, 0.7, 0.0) == set()
+    assert looked(before, 0.7, 30.0) == {HIGH}
+    after.watch.begin(before.watch.kept)
+    assert looked(after, 0.7, 0.0) == {HIGH}
+    assert looked(after, 0.5, 1.0) == set()
+
+
 DAY_S = 86_400.0
 
 

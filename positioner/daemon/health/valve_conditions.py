@@ -6,6 +6,7 @@ model changed          |k_s / k_s of the first identification - 1| > [alarms] mo
 test overdue           no test on the valve for [alarms] test_interval_days
 """
 
+from dataclasses import replace
 from math import isfinite
 from typing import Annotated, NamedTuple, Self
 
@@ -19,7 +20,7 @@ from positioner.control.controller_memory import Decision
 from positioner.control.sample import Sample
 from positioner.daemon.health.daily_figures import DAY_S
 from positioner.daemon.health.packing_tests import FoundFriction, PackingLimits, PackingTests
-from positioner.daemon.health.position_limits import PositionLimits
+from positioner.daemon.health.position_limits import SIDES, PositionLimits
 
 
 def _cause(name: str) -> str:
@@ -35,7 +36,7 @@ class KeptConditions(Schema):
     """What is kept of them over a restart."""
 
     raised: Many[CauseName] = ()
-    """By the tests of the packing."""
+    """By the tests of the packing, and by limits of the opening, whose delays would begin anew."""
     spring_pa_per_m: Positive | None = None
     """k_s / A of the first identification."""
     tested_s: NonNegative | None = None
@@ -69,7 +70,9 @@ class ValveConditions:
     def begin(self, kept: KeptConditions) -> Self:
         """Go on with what was kept."""
         self._kept = kept
-        self._packing.begin(frozenset(Ne107Cause[each] for each in kept.raised))
+        raised = frozenset(Ne107Cause[each] for each in kept.raised)
+        self._packing.begin(raised - SIDES.keys())
+        self._limits = replace(self._limits, raised=raised & self._limits.limits.keys())
         return self
 
     def tested(self, at_s: float | None) -> None:
@@ -79,8 +82,8 @@ class ValveConditions:
 
     def look(self, sample: Sample, decision: Decision, packing: PackingFigures, wall_s: float) -> frozenset[Ne107Cause]:
         """Return what holds now; `wall_s` is the time of day, s since 1970."""
-        raised = self._packing.look(sample.now_s, *packing)
         self._limits = self._limits.after(sample.now_s, self._travel.opening(sample.position_m))
+        raised = self._packing.look(sample.now_s, *packing) | self._limits.raised
         spring, changed = self._spring(decision)
         tested_s = self._tested_s(decision, wall_s)
         self._kept = KeptConditions(
@@ -88,7 +91,7 @@ class ValveConditions:
         )
         overdue = 0.0 < self._alarms.test_interval_days * DAY_S < wall_s - tested_s
         others = {Ne107Cause.MODEL_CHANGED: changed, Ne107Cause.TEST_OVERDUE: overdue}
-        return raised | self._limits.raised | {cause for cause, holds in others.items() if holds}
+        return raised | {cause for cause, holds in others.items() if holds}
 
     def _spring(self, decision: Decision) -> tuple[float | None, bool]:
         """Return the spring of the first identification, Pa/m, and whether today's is another."""
