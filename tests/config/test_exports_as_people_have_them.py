@@ -591,6 +591,15 @@ REFUSED = {
         "line 9: '0.6' in 'OUT' has no unit, and others there are in bar and mbar",
         ("time_s=t", "position_m=PV:%", "command_pa=OUT"),
     ),
+    "a number in another unit than those without one": Bad(
+        text(rows(out=[f"{600 + i} mbar" if i == 7 else f"0.{600 + i}" for i in range(N)])),
+        "line 2: '0.600' in 'OUT' has no unit, and others there are in mbar",
+    ),
+    "numbers in another unit than the header's, as those without one are read": Bad(
+        text(rows(out=[f"0.{600 + i}" if i == 7 else f"{600 + i} mbar" for i in range(N)], header="t,PV,OUT [bar]")),
+        "line 9: '0.607' in 'OUT .bar.' has no unit, and others there are in mbar",
+        ("time_s=t", "position_m=PV:%", "command_pa=OUT [bar]:mbar"),
+    ),
     "a workbook's days, not said": Bad(
         text(rows(time=[f"{46085.25 + t / 86400:.10f}" for t in T])), "type --column time_s=t:d, days of a workbook"
     ),

@@ -62,8 +62,7 @@ def unit_of(path: Path, source: Source, samples: Samples) -> str:
             )
     if said:
         unit, line = next(iter(said.items()))
-        meant = {mapped, mapped[:-1] if mapped in ABSOLUTE else mapped}
-        if mapped and mapped != "iso" and not meant & set(said):
+        if mapped and mapped != "iso" and not _meant(mapped) & set(said):
             raise InputError(
                 str(path),
                 f"column {source.theirs!r} is in {unit} by {header.table.place} {line}, the mapping says {mapped}: "
@@ -79,6 +78,11 @@ def unit_of(path: Path, source: Source, samples: Samples) -> str:
             )
         samples.notes[f"unit of {source.theirs}, not known"] = unknown
     return source.unit or SI[ending]
+
+
+def _meant(unit: str) -> set[str]:
+    """Return a unit as mapped, and as it stands in a file: there an absolute pressure may not say that it is one."""
+    return {unit, unit[:-1] if unit in ABSOLUTE else unit}
 
 
 def _behind_numbers(samples: Samples, source: Source) -> dict[str, int]:
@@ -106,23 +110,24 @@ def in_si(path: Path, samples: Samples, source: Source, unit: str, decimal: str,
 
     Raises:
         InputError: not one number, a numeral that is none with this decimal sign, a number without a unit among such
-            whose units change, or a share of an unknown stroke.
+            that have another, or a share of an unknown stroke.
     """
     raw, units = _numbers(path, samples, source, decimal)
     plain, turned = unit.removeprefix("-"), unit.startswith("-")
     own = Counter(each for each in units if each is not None)
-    if len(own) < 2:
-        return _scale(raw, source, plain, scale, turned=turned)
-    samples.notes[f"units of {source.theirs}, each cell by its own"] = ", ".join(
-        f"{count} {name}" for name, count in own.most_common()
-    )
     bare = next((row for row, each in enumerate(units) if each is None and raw[row] and not isnan(raw[row])), None)
-    if bare is not None:
+    by_header = samples.header.units.get(source.theirs, (plain, 0))[0]
+    if own and bare is not None and not {*own, by_header} <= _meant(plain):
         raise InputError(
             str(path),
             f"{samples.header.table.place} {samples.lines[bare]}: {samples.cells[source.theirs][bare]!r} in "
             f"{source.theirs!r} has no unit, and others there are in {' and '.join(own)}: mend the file",
         )
+    if len(own) < 2:
+        return _scale(raw, source, plain, scale, turned=turned)
+    samples.notes[f"units of {source.theirs}, each cell by its own"] = ", ".join(
+        f"{count} {name}" for name, count in own.most_common()
+    )
     found = np.where(raw == 0.0, 0.0, np.nan)
     for each in own:
         rows = np.array([name == each for name in units])
