@@ -127,17 +127,13 @@ def _group(
     for count, source in enumerate(values):
         tell(f"understanding {len(part.lines)} rows", (count + 1) / (len(values) + 1))
         columns[source.name] = np.where(good, in_si(path, part, source, units[source.name], decimal, scale), np.nan)
-    local_from_s = clock.origin_s if clock.local else None
-    time_s, rows, said = in_order(
-        path, clock.time_s, list(columns.values()), part.lines, local_from_s=local_from_s, daily=clock.daily
-    )
+    time_s, ordered, said = in_order(path, clock, columns, part.lines)
     metadata |= part.notes | said
     zero_s = 0.0 if clock.origin_s is None else time_s[0]
     if clock.recorded and "recorded" not in metadata:
         metadata["recorded"] = clock.recorded
     name = "" if theirs is None else part.header.names[part.header.at[theirs.theirs][0]]
     origin_s = None if clock.origin_s is None else clock.origin_s + time_s[0] - clock.time_s[0]
-    ordered = {key: column[rows] for key, column in columns.items()}
     return Group(time_s - zero_s, origin_s, ordered, name, id(part.header.table))
 
 

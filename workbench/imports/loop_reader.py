@@ -137,11 +137,8 @@ def _of_one_clock(
         elif role != "time" and theirs in part.cells:
             _require_one_unit(path, theirs, part.cells[theirs])
             values[role] = numbers_of(part.cells[theirs], decimal)
-    local_from_s = clock.origin_s if clock.local else None
-    time_s, rows, notes = in_order(
-        path, clock.time_s, list(values.values()), part.lines, local_from_s=local_from_s, daily=clock.daily
-    )
-    return _OneClock(time_s + (clock.origin_s or 0.0), {role: column[rows] for role, column in values.items()}, notes)
+    time_s, columns, notes = in_order(path, clock, values, part.lines)
+    return _OneClock(time_s + (clock.origin_s or 0.0), columns, notes)
 
 
 def _and_unit(theirs: str) -> tuple[str, str | None]:

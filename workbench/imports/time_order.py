@@ -14,7 +14,7 @@ What can be told is put right and told; what cannot is refused:
 - rows of one time and different values: their order is not known, so they are refused.
 """
 
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from datetime import UTC, datetime
 from pathlib import Path
 
@@ -22,6 +22,7 @@ import numpy as np
 import numpy.typing as npt
 
 from config.errors import InputError
+from workbench.imports.column_clock import Clock
 
 Array = npt.NDArray[np.float64]
 Rows = npt.NDArray[np.intp]
@@ -36,22 +37,20 @@ SET_BACK_TOLERATED = 0.01
 
 
 def in_order(
-    path: Path, time_s: Array, values: Sequence[Array], lines: Sequence[int], *, local_from_s: float | None, daily: bool
-) -> tuple[Array, Rows, dict[str, str]]:
-    """Return the time of the rows that are kept, which rows these are, and what was done, by key.
+    path: Path, clock: Clock, columns: Mapping[str, Array], lines: Sequence[int]
+) -> tuple[Array, dict[str, Array], dict[str, str]]:
+    """Return the time of the rows that are kept, their columns, and what was done, by key.
 
     Args:
         path: for messages.
-        time_s: (n,), as read.
-        values: columns of n, NaN where missing.
+        clock: when the rows are, n of them, as read.
+        columns: of n, by name, NaN where missing.
         lines: (n,), where each row stands in the file.
-        local_from_s: the first, s from 1970 as the clock shows it, of local times, which a clock change repeats; None:
-            they are not.
-        daily: whether they are times of day.
 
     Raises:
         InputError: rows of one time with different values, or time that is no clock.
     """
+    time_s, values, daily = clock.time_s, list(columns.values()), clock.daily
     said: dict[str, str] = {}
     rows: Rows = np.arange(len(time_s))
     steps = np.diff(time_s)
@@ -61,15 +60,15 @@ def in_order(
     t = time_s[rows]
     if daily:
         t = _over_midnight(t, said)
-    elif local_from_s is not None:
-        t = _over_the_hour_twice(t, local_from_s - time_s[0], said)
+    elif clock.local and clock.origin_s is not None:
+        t = _over_the_hour_twice(t, clock.origin_s - time_s[0], said)
     once = _first_of_repeated(t, values, rows)
     if dropped := int((~once).sum()):
         said["repeated rows"] = f"{dropped} left out"
         t, rows = t[once], rows[once]
     t, rows = _sort_rows(t, rows, said)
     _require_a_clock(path, t, rows, lines)
-    return t, rows, said
+    return t, {name: column[rows] for name, column in columns.items()}, said
 
 
 def _over_midnight(t: Array, said: dict[str, str]) -> Array:
