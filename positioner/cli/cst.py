@@ -31,10 +31,9 @@ def run(arguments: argparse.Namespace) -> int:
     asked.require_possible()
     require_ready(file, arguments)
     valve, bounds, stroke_m = RunningValve(file, arguments), bounds_of(file), file.valve.stroke_m
-    start_pa = valve.command_pa()
-    dead_band_pa = valve.dead_band_pa()
-    programs = tuple(programme(asked, bounds, start_pa, stroke_m, way, dead_band_pa) for way in (1, -1))
+    dead_band_pa, ways = valve.dead_band_pa(), (1, -1)
+    programs = (programme(asked, bounds, valve.command_pa(), stroke_m, way, dead_band_pa) for way in ways)
     with playing(TEST, file, arguments):
-        played = played_all(valve, programs)
+        played = played_all(valve, programs, len(ways))
     outcome = continuous_stroke(played, asked, file.valve.name, stroke_m, valve.slope_pa_per_m())
     return finished(outcome, file, arguments)

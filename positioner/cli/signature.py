@@ -39,7 +39,7 @@ def run(arguments: argparse.Namespace) -> int:
         valve = RunningValve(file, arguments)
         programs = programmes(bounds_of(file), valve.command_pa(), str(arguments.config))
         with playing("signature", file, arguments):
-            recordings = recordings_of(played_all(valve, programs))
+            recordings = recordings_of(played_all(valve, programs, len(programs)))
     name = str(arguments.rec[0]) if file is None else file.valve.name
     stroke_m = arguments.stroke_m if file is None else file.valve.stroke_m
     return finished(signature(recordings, Nameplate(name, stroke_m, arguments.area_m2)), file, arguments)

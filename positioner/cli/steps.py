@@ -49,6 +49,6 @@ def run(arguments: argparse.Namespace) -> int:
     asked = SmallSteps(expected_pa, arguments.held_s, arguments.most)
     program = programme(asked, bounds_of(file), valve.command_pa(), file.valve.stroke_m, str(arguments.config))
     with playing(TEST, file, arguments):
-        (recording,) = recordings_of(played_all(valve, (program,)))
+        (recording,) = recordings_of(played_all(valve, (program,), 1))
     outcome = small_steps(recording, file.valve.name, file.valve.stroke_m, valve.slope_pa_per_m())
     return finished(outcome, file, arguments)

@@ -1,14 +1,18 @@
 """What is said of an experiment that was not played to its end."""
 
+import argparse
+from contextlib import nullcontext
+from pathlib import Path
 from typing import cast
 
 import numpy as np
 import pytest
 
 from config.codes import ExperimentState, Fault
+from config.daemon_file import DaemonFile
 from config.recording import Recording
 from positioner.cli.parts import experiment_player
-from positioner.cli.parts.experiment_player import is_of, wait_until_landed, why_not
+from positioner.cli.parts.experiment_player import RunningValve, is_of, wait_until_landed, why_not
 from positioner.dcs import Dcs
 
 
@@ -48,8 +52,10 @@ class Landing:
 
 def test_a_test_begins_once_the_law_has_held_its_command_for_ten_cycles(monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setattr(experiment_player, "LANDING_POLL_S", 0.0)
+    monkeypatch.setattr(experiment_player, "_folder", lambda *_: Path())
     valve = Landing()
-    wait_until_landed(cast(Dcs, valve))
+    monkeypatch.setattr(experiment_player, "_dcs", lambda _: nullcontext(valve))
+    assert RunningValve(cast(DaemonFile, None), argparse.Namespace()).command_pa() == 40.0
     assert valve.cycles >= 50.0
     monkeypatch.setattr(experiment_player, "LANDS_WITHIN_S", 0.0)
     wait_until_landed(cast(Dcs, valve))

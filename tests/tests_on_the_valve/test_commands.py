@@ -1,11 +1,12 @@
 """The commands of tests on a running valve: what they print, keep and return; the daemon is in virtual time."""
 
 import json
+from dataclasses import replace
 from pathlib import Path
 
 import pytest
 
-from config.codes import ExperimentState
+from config.codes import ExperimentState, Mode
 from config.errors import CommandFailed
 from config.slave_file import Initial
 from positioner.cli.main import main
@@ -57,6 +58,21 @@ class Interrupted(InMemory):
 
     def play(self, program: Program) -> Played:
         raise KeyboardInterrupt
+
+
+class Taken(InMemory):
+    """Whose law takes the stem elsewhere after each program."""
+
+    def play(self, program: Program) -> Played:
+        assert program.points[0] == (0.0, self.command_pa()), "it begins with the command in force"
+        played = super().play(program)
+        asked = self.cycle.requests
+        by_hand = {"manual_pa": self.command_pa() - 2e3, "manual_writes": asked.manual_writes + 1}
+        for mode, also in ((Mode.MANUAL, by_hand), (Mode.AUTOMATIC, {})):
+            asked = replace(asked, mode=mode, mode_writes=asked.mode_writes + 1, **also)  # type: ignore[arg-type]
+            self.cycle.requests = asked
+            self.watch(1.0)
+        return played
 
 
 @pytest.fixture
@@ -120,6 +136,14 @@ def test_the_others_pass_and_print_their_figures(
     assert main([command, str(site), "--keep", "as_found", *options]) == 0
     assert said in capsys.readouterr().out
     assert [each.kind for each in kept(site)] == ["as_found"]
+
+
+def test_each_way_of_a_continuous_stroke_begins_where_the_law_has_landed_after_the_other(
+    site: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """Else the way to its first command is no rest, and the stem was said not to have moved."""
+    serve(monkeypatch, Taken, MIDWAY)
+    assert main(["cst", str(site), "--rate", "0.01", "--start", "0.002"]) == 0
 
 
 def test_a_continuous_stroke_that_has_no_time_to_break_the_stem_loose_is_refused(

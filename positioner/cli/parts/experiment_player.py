@@ -35,7 +35,7 @@ SAME_PRESSURE_SHARE, LEAST_PLAYED_SHARE = 0.01, 0.95
 
 
 def require_ready(file: "DaemonFile", arguments: argparse.Namespace) -> None:
-    """Look whether a daemon answers, in automatic, with consent, records, and has its stem at rest where it may play.
+    """Look whether a daemon answers, in automatic, with consent, records, and has its stem where it may play.
 
     Raises:
         InputError: no recorder in the file, or its folder is not on this machine.
@@ -67,7 +67,6 @@ def require_ready(file: "DaemonFile", arguments: argparse.Namespace) -> None:
                 f"the stem is at {position:.3g} of its stroke, outside [experiment] travel_window = "
                 f"[{least:g}, {most:g}]: move it there, by positioner set reference"
             )
-        wait_until_landed(dcs)
 
 
 class RunningValve:
@@ -84,8 +83,9 @@ class RunningValve:
         self._folder = _folder(file, arguments)
 
     def command_pa(self) -> float:
-        """Return the command in force, Pa."""
+        """Return the command in force, Pa, once the law has landed."""
         with _dcs(self._arguments) as dcs:
+            wait_until_landed(dcs)
             return float(dcs.get("command"))
 
     def stem_m(self) -> float:

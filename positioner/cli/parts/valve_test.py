@@ -3,7 +3,7 @@
 import argparse
 import sys
 import time
-from collections.abc import Iterator, Sequence
+from collections.abc import Iterable, Iterator, Sequence
 from contextlib import contextmanager
 from dataclasses import replace
 from pathlib import Path
@@ -112,12 +112,11 @@ def require_whole_travel(file: "DaemonFile", test: str, config: Path) -> None:
         raise InputError(str(config), WINDOW_NEEDED.format(test, low, high))
 
 
-def played_all(player: "Player", programs: "tuple[Program, ...]") -> "list[Played]":
-    """Play programs one after another until one does not come to its end; say what goes on."""
+def played_all(player: "Player", programs: "Iterable[Program]", count: int) -> "list[Played]":
+    """Play so many programs, each made when it begins, until one does not come to its end; say what goes on."""
     played = []
     for number, program in enumerate(programs, start=1):
-        of = f"{number} of {len(programs)}"
-        print(f"{of}: {program.name}, {program.lasts_s:.0f} s", file=sys.stderr, flush=True)
+        print(f"{number} of {count}: {program.name}, {program.lasts_s:.0f} s", file=sys.stderr, flush=True)
         played.append(player.play(program))
         if not played[-1].state.played:
             break
