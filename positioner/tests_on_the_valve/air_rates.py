@@ -40,7 +40,7 @@ def supply_lacking(recordings: Sequence[Recording]) -> str:
     return ""
 
 
-def unmoved(recordings: Sequence[Recording]) -> tuple[ValveTestVerdict, str]:
+def verdict_at_rest(recordings: Sequence[Recording]) -> tuple[ValveTestVerdict, str]:
     """Return the verdict on a stem that no command has moved, and what its pressure says of it; empty if nothing."""
     lacking = supply_lacking(recordings)
     return ValveTestVerdict.NO_SUPPLY if lacking else ValveTestVerdict.NOT_MOVED, lacking

@@ -27,7 +27,7 @@ from config.recording import Column, Recording
 from config.travel import ActionWord
 from positioner.response.figure import Figure, no_value
 from positioner.tests_on_the_valve import signature, small_steps
-from positioner.tests_on_the_valve.air_rates import air_rates, supply_lacking, unmoved
+from positioner.tests_on_the_valve.air_rates import air_rates, supply_lacking, verdict_at_rest
 from positioner.tests_on_the_valve.outcome import Outcome, Quantity, digits
 from positioner.tests_on_the_valve.program import Bounds, Leap, Player, Program, ramped
 from positioner.tests_on_the_valve.ramps import difference, rate_of, scaled
@@ -211,7 +211,7 @@ def _direction(valve: Watching, bounds: Bounds, start_pa: float, moved_m: float,
         farthest = float(gone[int(np.argmax(np.abs(np.convolve(gone, np.ones(5) / 5.0, "same"))))])
         if abs(farthest) > 0.5 * moved_m:
             return way * float(np.sign(farthest))
-    verdict, lacking = unmoved([recording])
+    verdict, lacking = verdict_at_rest([recording])
     raise _Ended(verdict, lacking or "over the whole range of commands the reading stands still: stuck, or no supply")
 
 

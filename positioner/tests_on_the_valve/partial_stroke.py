@@ -25,7 +25,7 @@ from config.codes import ExperimentState, ValveTestVerdict
 from config.errors import InputError
 from config.recording import Recording
 from positioner.response.figure import Figure, no_value
-from positioner.tests_on_the_valve.air_rates import unmoved
+from positioner.tests_on_the_valve.air_rates import verdict_at_rest
 from positioner.tests_on_the_valve.breakout import (
     Breakout,
     Rest,
@@ -148,7 +148,7 @@ def partial_stroke(
     ]
     notes = [f"broken off: {played.problem}"] if broken_off else []
     if found is None and played.state is ExperimentState.COMPLETE:
-        still, lacking = unmoved([recording])
+        still, lacking = verdict_at_rest([recording])
         verdicts.append(still)
         notes += [lacking] if lacking else []
     if tolerance > asked.start * stroke_m:

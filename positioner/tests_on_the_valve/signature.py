@@ -31,7 +31,7 @@ from config.errors import InputError
 from config.recording import Column, Recording
 from config.results.block import Table
 from positioner.response.figure import Figure, no_value
-from positioner.tests_on_the_valve.air_rates import supply_lacking, unmoved
+from positioner.tests_on_the_valve.air_rates import supply_lacking, verdict_at_rest
 from positioner.tests_on_the_valve.outcome import Curve, Outcome, Picture, Quantity
 from positioner.tests_on_the_valve.program import Bounds, Leap, Program, ramped
 from positioner.tests_on_the_valve.ramps import Leg, Line, Ramps, difference, legs_of, ramps_of, scaled
@@ -133,7 +133,7 @@ def _without_motion(recordings: "list[Recording]", legs: list[Leg], plate: Namep
     if not legs:
         why = "no ramp in the recording: the command nowhere goes one way over most of its span"
         return Outcome("signature", plate.valve, (), (ValveTestVerdict.UNDETERMINED,), (why,))
-    verdict, supply = unmoved(recordings)
+    verdict, supply = verdict_at_rest(recordings)
     why = supply or "the stem did not follow the command: it is stuck, it has no supply, or the reading is another's"
     return Outcome("signature", plate.valve, (), (verdict,), (why,))
 

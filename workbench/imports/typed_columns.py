@@ -62,7 +62,7 @@ def unit_of(path: Path, source: Source, samples: Samples) -> str:
             )
     if said:
         unit, line = next(iter(said.items()))
-        if mapped and mapped != "iso" and not _meant(mapped) & set(said):
+        if mapped and mapped != "iso" and not _file_units(mapped) & set(said):
             raise InputError(
                 str(path),
                 f"column {source.theirs!r} is in {unit} by {header.table.place} {line}, the mapping says {mapped}: "
@@ -80,7 +80,7 @@ def unit_of(path: Path, source: Source, samples: Samples) -> str:
     return source.unit or SI[ending]
 
 
-def _meant(unit: str) -> set[str]:
+def _file_units(unit: str) -> set[str]:
     """Return a unit as mapped, and as it stands in a file: there an absolute pressure may not say that it is one."""
     return {unit, unit[:-1] if unit in ABSOLUTE else unit}
 
@@ -117,7 +117,7 @@ def in_si(path: Path, samples: Samples, source: Source, unit: str, decimal: str,
     own = Counter(each for each in units if each is not None)
     bare = next((row for row, each in enumerate(units) if each is None and raw[row] and not isnan(raw[row])), None)
     by_header = samples.header.units.get(source.theirs, (plain, 0))[0]
-    if own and bare is not None and not {*own, by_header} <= _meant(plain):
+    if own and bare is not None and not {*own, by_header} <= _file_units(plain):
         raise InputError(
             str(path),
             f"{samples.header.table.place} {samples.lines[bare]}: {samples.cells[source.theirs][bare]!r} in "
