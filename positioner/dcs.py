@@ -122,8 +122,11 @@ class Dcs:
                 raise DcsError(f"{self._where}: {asked} was refused: {why}") from None
 
     def _why_refused(self, values: Mapping[str, float], error: ClientError) -> str:
-        """Return what the daemon's registers say of why a write was refused as busy; empty where they do not."""
-        if not isinstance(error, Refused) or error.code != ExcCodes.DEVICE_BUSY:
+        """Return why a write was refused, where its values or the daemon's registers tell; else nothing."""
+        code = error.code if isinstance(error, Refused) else None
+        if code == ExcCodes.ILLEGAL_VALUE and {"alarm_shelve", "alarm_shelve_time"} <= values.keys():
+            return "allowed is up to [alarms] shelve_limit_s of the daemon's file"
+        if code != ExcCodes.DEVICE_BUSY:
             return ""
         try:
             now = self.get_all("locked_out", "fault")
