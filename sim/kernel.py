@@ -57,7 +57,7 @@ SLOW_ENTRIES: Mapping[str, tuple[int, ...]] = {
 
 TOLD_ENTRIES: Mapping[str, tuple[int, ...]] = {
     "rest": EITHER["rest"],
-    "tell": (VECTOR, VECTOR, VECTOR, VECTOR, VECTOR, VECTOR, NUMBER, NUMBER, NUMBER, VECTOR, MATRIX),
+    "tell": (VECTOR, VECTOR, VECTOR, VECTOR, VECTOR, VECTOR, NUMBER, NUMBER, NUMBER, NUMBER, VECTOR, MATRIX),
 }
 
 
@@ -91,7 +91,7 @@ class QuasiStaticKernel(EitherKernel):
 class ToldKernel:
     """`tell` of `told.py`, with the effects in their places."""
 
-    tell: Entry[Vector, Vector, Vector, Vector, Vector, Vector, float, float, float, Vector, Vector]
+    tell: Entry[Vector, Vector, Vector, Vector, Vector, Vector, float, float, float, float, Vector, Vector]
 
 
 def told_kernel(effects: Sequence[Effect]) -> ToldKernel:

@@ -17,7 +17,9 @@ within `blur` of where it is held, m: of a rest L is the least there, of a break
 come to rest again within `UNSEEN` of it gives way, as into a stop: nobody has seen it stay.
 
 Where an effect has moved the stuck stem by more than the blur, what is seen to move has not yet broken loose: it does
-so by itself, at F_s by the law of `sim.karnopp`, and its onset tells no load. So it does where it rests within a move.
+so by itself, at F_s by the law of `sim.karnopp`, and its onset tells no load. So it does where it rests within a move,
+as in slips that follow each other faster than samples do. Eased, it goes on there at F_c: where the stem is then hangs
+smoothly on every parameter, and a search that begins far off is led by that.
 
 What acts on the stem's measured position, a positioner, is fed that: the loop is cut, and a pressure without feedback
 is smooth in every parameter.
@@ -72,8 +74,8 @@ class Told(NamedTuple):
     fast: float
     landed: float
     """Where it came to rest, m: an effect may have moved it since."""
-    creeps: float
-    """1 if an effect has ever moved it at rest by more than the blur."""
+    alone: float
+    """1 if it breaks loose by itself within a move: not eased, or moved at rest by an effect, by more than the blur."""
 
 
 def told_valve(theta: Vector) -> Karnopp:
@@ -124,7 +126,7 @@ def carried(
     tolerance: float,
     held: bool,
     landed: float,
-    creeps: float,
+    alone: float,
     fast: float,
     seen: float,
     seen_rate: float,
@@ -159,12 +161,12 @@ def carried(
                 most = max(most, load(valve, Stem(t0, x, 0.0, p0), blur, not held, q, z))
             stays = held and not (rested and gives_way(free, Stem(t0 + s, x, 0.0, p), blur, q, z))
             crept = rested and abs(x - landed) > blur
-            creeps = 1.0 if crept else creeps
+            alone = 1.0 if crept else alone
             law = free if crept or fast > 0.0 or held != stays else valve
             drive = Drive(t0, p0, (p - p0) / s)
             x, v, mode, sigma, indicated = follow(law, drive, s, x, v, p, mode, sigma, tolerance, stays, q, z)
             if mode == STUCK:
-                fast = 0.0 if held else fast * creeps
+                fast = 0.0 if held else fast * alone
             elif abs(v) > FAST * valve.v_s:
                 fast = 1.0
             if not (rested and mode == STUCK) or held != stays:
@@ -174,7 +176,7 @@ def carried(
             if mode == STUCK and held and not (rested and p == p0):
                 most = max(most, load(valve, Stem(t0, x, v, p), blur, False, q, z))
     off = unknown(sigma + excess(valve, Stem(t + duration, x, v, p), q, z))
-    return Told(Condition(t + duration, x + off, v, p, mode, sigma, indicated + off), most, fast, landed, creeps)
+    return Told(Condition(t + duration, x + off, v, p, mode, sigma, indicated + off), most, fast, landed, alone)
 
 
 def alike(k: int, commands: Vector, held: Vector, indicated: Vector, blur: float) -> int:
@@ -209,12 +211,14 @@ def tell(
     longest_step: float,
     tolerance: float,
     blur: float,
+    alone: float,
     indicated: Vector,
     loads: Vector,
 ) -> None:
     """Hold each command for its period in turn, the stem for a share of it; write what is indicated, m, (periods + 1,).
 
-    Seen is what a pressure path that obeys the stem is fed, m, (periods + 1,); NaN: the simulated stem.
+    Seen is what a pressure path that obeys the stem is fed, m, (periods + 1,); NaN: the simulated stem. Alone: 1 where
+    what rests within a move breaks loose by itself, 0 where it is eased.
     Shares, (periods,), from 0, loose throughout, to 1, held throughout. Loads, (2, periods): L, N, of the stem held in
     a period, and where it was let go in it; 0 where it was not.
 
@@ -222,7 +226,7 @@ def tell(
     convex between, and greatest at one of the ends.
     """
     valve, now, fast = told_valve(theta), read(state), 0.0
-    place, landed, creeps = FAR_M, now.x, 0.0
+    place, landed = FAR_M, now.x
     indicated[0] = now.indicated
     k, n = 0, len(commands)
     while k < n:
@@ -239,10 +243,10 @@ def tell(
                     rests_s += periods[j]
             fast = max(fast, goes_on(k, commands, now))
             here = carried(
-                *(valve, now, command, rests_s, longest_step, tolerance, True, landed, creeps),
+                *(valve, now, command, rests_s, longest_step, tolerance, True, landed, alone),
                 *(fast, fed, rate, blur, FAR_M, theta, state),
             )
-            now, fast, landed, creeps = here.now, here.fast, here.landed, here.creeps
+            now, fast, landed, alone = here.now, here.fast, here.landed, here.alone
             for j in range(k, end):
                 loads[0, j], loads[1, j], indicated[j + 1] = max(here.load, HELD_N), 0.0, now.indicated
             place = now.x if now.mode == STUCK else FAR_M
@@ -250,10 +254,10 @@ def tell(
             still = abs(now.x - place) <= blur and abs(now.x - landed) <= blur
             fed += rate * rests_s
             here = carried(
-                *(valve, now, command, slides_s, longest_step, tolerance, False, landed, creeps),
+                *(valve, now, command, slides_s, longest_step, tolerance, False, landed, alone),
                 *(fast, fed, rate, blur, place, theta, state),
             )
-            now, fast, landed, creeps = here.now, here.fast, here.landed, here.creeps
+            now, fast, landed, alone = here.now, here.fast, here.landed, here.alone
             if still:
                 loads[1, k] = max(here.load, loads[0, k], HELD_N)
             if abs(now.x - place) > blur:

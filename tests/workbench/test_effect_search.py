@@ -43,9 +43,9 @@ class ByHand(Trial):
     fit: Fit
 
     @classmethod
-    def of(cls, fit: Fit) -> "ByHand":
+    def of(cls, fit: Fit, before: Fit) -> "ByHand":
         like, coarse = SimpleNamespace(parameters=tuple(fit.parameters)), SimpleNamespace(cost=COARSE * fit.cost)
-        return cls(cast(Likelihood, like), (cast(End, coarse),), fit)
+        return cls(cast(Likelihood, like), (cast(End, coarse),), before.terms, fit)
 
     @property
     def terms(self) -> Terms:
@@ -76,8 +76,8 @@ class Engine:
     def base_fit(self, _: object, valve: ValveFile, **__: object) -> Fit:
         return self._fit(*(each.name for each in valve.effect))
 
-    def glimpse(self, _: object, known: ValveFile, effects: Sequence[str], __: Fit) -> Trial:
-        return ByHand.of(self._fit(*(each.name for each in known.effect), *effects))
+    def glimpse(self, _: object, known: ValveFile, effects: Sequence[str], before: Fit) -> Trial:
+        return ByHand.of(self._fit(*(each.name for each in known.effect), *effects), before)
 
     def advance(self, trial: ByHand) -> Trial:
         return trial

@@ -47,7 +47,10 @@ PLACES = Places()
 
 
 def settle(like: Likelihood, end: End) -> End:
-    """Search on where other onsets suit the valve better than those that a search came to, as long as it pays."""
+    """Search on where an eased search has come to, and where other onsets suit the valve better, as long as it pays."""
+    cost = like.cost(like.at(like.theta(end.z), end.onsets_s).whole)
+    if cost != end.cost:  # the stem stops within a move
+        end = descend(like, end.z, with_onsets(like, like.theta(end.z))[0])
     for _ in range(SETTLE_ROUNDS):
         onsets_s, groups = with_onsets(like, like.theta(end.z))
         if like.cost(groups.whole) > end.cost - NATS:

@@ -123,9 +123,9 @@ def _base_fit(
     composition = Composition.from_file(valve)
     like = of.likelihood(composition, free)
     first, *others = starts(like)
-    ends = [settle(like, _from_afar(like, first))]
+    ends = [settle(like, _from_afar(like.eased, first))]
     if not at_the_noise(ends[0].cost, like.count):
-        ends += on_threads(lambda z: settle(like, _from_afar(like, z)), others, workers)
+        ends += on_threads(lambda z: settle(like, _from_afar(like.eased, z)), others, workers)
     best = min(ends, key=lambda each: each.cost)
     return _best(of, like, ends), not at_the_noise(best.cost, like.count)
 
@@ -164,7 +164,9 @@ class Trial:
 
     like: Likelihood
     valleys: tuple[End, ...]
-    """By cost, the best first."""
+    """Of eased searches, by cost, the best first."""
+    begun: Terms
+    """The eased likelihood of the valve without the effects."""
 
     @property
     def cost(self) -> float:
@@ -173,7 +175,7 @@ class Trial:
 
     @property
     def terms(self) -> Terms:
-        """The likelihood of the best valley."""
+        """The eased likelihood of the best valley."""
         return terms(self.like, self.valleys[0].groups)
 
 
@@ -192,7 +194,8 @@ def glimpse(
     composition = extended(base.valve, effects, valve.valve)
     added_effects = composition.effects[len(base.valve.effect) :]
     of.require_shown(added_effects)
-    like = of.likelihood(composition, free, _scale(base, valve.valve), valve.valve)
+    whole = of.likelihood(composition, free, _scale(base, valve.valve), valve.valve)
+    like = whole.eased
     names = {each.name for each in added_effects}
     added = [each for each in like.parameters if each.name.partition(".")[0] in names]
     fitted = Origin(composition.theta, base.onsets_s)
@@ -217,17 +220,19 @@ def glimpse(
     if other_order is not None and not at_the_noise(best.cost, like.count):
         onsets_s, _ = with_onsets(like, like.theta(other_order), COARSE_ROUNDS)
         ends.append(descend(like, other_order, onsets_s, GLIMPSE))
-    return Trial(like, tuple(sorted(ends, key=lambda each: each.cost)))
+    begun = terms(like, like.at(like.theta(off), base.onsets_s))
+    return Trial(whole, tuple(sorted(ends, key=lambda each: each.cost)), begun)
 
 
 @linear_algebra_alone()
 def advance(trial: Trial) -> Trial:
     """Search on in the best valley of a trial, and in the next best if that leaves something."""
-    like, (first, *others) = trial.like, trial.valleys
+    like, (first, *others) = trial.like.eased, trial.valleys
     ends = [descend(like, first.z, first.onsets_s, COARSE)]
     if not at_the_noise(ends[0].cost, like.count) and others and others[0].cost < NEAR * first.cost:
         ends.append(descend(like, others[0].z, others[0].onsets_s, COARSE))
-    return Trial(like, tuple(sorted((*ends, *others[len(ends) - 1 :]), key=lambda each: each.cost)))
+    valleys = sorted((*ends, *others[len(ends) - 1 :]), key=lambda each: each.cost)
+    return replace(trial, valleys=tuple(valleys))
 
 
 @linear_algebra_alone()
@@ -235,15 +240,17 @@ def finish(of: Problem, trial: Trial) -> Fit:
     """Search to the end from the best valley of a trial, and from the next if it is nearly as good."""
     like, (first, *others) = trial.like, trial.valleys
     near = [first, *(each for each in others[:1] if each.cost < NEAR * first.cost)]
-    return _best(of, like, [settle(like, descend(like, each.z, each.onsets_s)) for each in near])
+    return _best(of, like, [settle(like, descend(like.eased, each.z, each.onsets_s)) for each in near])
 
 
 @linear_algebra_alone()
 def leave_off(of: Problem, trial: Trial) -> Fit:
     """Return the fit of a trial that is not gone on with, as far as it came."""
-    best = trial.valleys[0]
-    jacobian = derivatives(trial.like, best.z, best.onsets_s)
-    return fit_at(of, trial.like, replace(best, jacobian=jacobian), agreement=0)
+    like, best = trial.like, trial.valleys[0]
+    groups = like.at(like.theta(best.z), best.onsets_s)
+    jacobian = derivatives(like, best.z, best.onsets_s)
+    end = replace(best, cost=like.cost(groups.whole), groups=groups, jacobian=jacobian)
+    return fit_at(of, like, end, agreement=0)
 
 
 def problem_of(found: Fit, record: Record) -> Problem:

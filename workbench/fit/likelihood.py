@@ -19,8 +19,9 @@ nothing in it asks whether a slip happened.
 """
 
 from collections.abc import Sequence
+from copy import copy
 from dataclasses import dataclass
-from functools import lru_cache
+from functools import cached_property, lru_cache
 from typing import NamedTuple
 
 import numpy as np
@@ -182,8 +183,16 @@ class Likelihood:
         self.layout = layout(record, self.run.moves, weights)
         self.sigma_m = record.scale_m
         self.landing_m = self.sigma_m * np.sqrt(1.0 / self.layout.per_rest + weights.landing**2)
+        self._is_eased = False
         self._last: tuple[bytes, Groups] | None = None
         self._quantum = next((i for i, each in enumerate(_guesses(composition)) if each == "quantum"), None)
+
+    @cached_property
+    def eased(self) -> "Likelihood":
+        """The same where static friction has no part in a move (`sim.told`): for a search that begins far off."""
+        eased = copy(self)
+        eased._is_eased, eased._last = True, None
+        return eased
 
     @property
     def moves(self) -> tuple[ToldMove, ...]:
@@ -226,7 +235,7 @@ class Likelihood:
     def path(self, theta: Vector, onsets_s: Vector) -> ToldPath:
         """Simulate, the sensor's rounding left out."""
         rounds = np.arange(theta.size) == (-1 if self._quantum is None else self._quantum)
-        return self.run.run(np.where(rounds, 0.0, theta), onsets_s)
+        return self.run.run(np.where(rounds, 0.0, theta), onsets_s, eased=self._is_eased)
 
     def off_m(self, path: ToldPath, theta: Vector) -> Vector:
         """Return what a path is off by, m, (n,)."""

@@ -132,9 +132,9 @@ class ToldRun:
             np.minimum(first + periods * period_s, latest), first + 0.5 * period_s
         )
 
-    def run(self, theta: Vector, onsets_s: Vector) -> ToldPath:
-        """Simulate; theta, (parameters,), as `composition.names`, onsets, s, (moves,)."""
-        vector = np.array(theta[self.free._kept])
+    def run(self, theta: Vector, onsets_s: Vector, *, eased: bool = False) -> ToldPath:
+        """Simulate; theta, (parameters,), as `composition.names`, onsets, s, (moves,); eased as of `sim.told`."""
+        vector, alone = np.array(theta[self.free._kept]), 0.0 if eased else 1.0
         indicated_m = np.full(len(self.record), np.nan)
         bears, breaks = np.zeros(len(self.moves)), np.zeros(len(self.moves))
         for part in self._parts:
@@ -145,7 +145,7 @@ class ToldRun:
             shown_m, loads = np.empty(segment.periods_s.size + 1), np.empty((2, segment.periods_s.size))
             self._tell(
                 *(vector, state, drive_pa, segment.periods_s, held, seen_m),
-                *(segment.step_s, self.free._tolerance, self.record.scale_m, shown_m, loads),
+                *(segment.step_s, self.free._tolerance, self.record.scale_m, alone, shown_m, loads),
             )
             indicated_m[segment.first : segment.end] = shown_m[:: segment.parts]
             if part.rested.size:

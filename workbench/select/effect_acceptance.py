@@ -90,10 +90,9 @@ def evidence_for(one: Fit, other: Fit) -> float:
     return 2.0 * one.terms.nats_above(other.terms) - (_cost(one) - _cost(other))
 
 
-def promise(terms: Terms, parameters: int, other: Fit) -> float:
-    """Return the most evidence that a likelihood may come to, whose so many parameters' deviations are not known."""
-    more = parameters - len(other.parameters)
-    return 2.0 * terms.nats_above(other.terms) - more * _log_events(terms)
+def promise(terms: Terms, other: Terms, more: int) -> float:
+    """Return the most evidence that a likelihood may come to by so many more parameters, whose deviations are open."""
+    return 2.0 * terms.nats_above(other) - more * _log_events(terms)
 
 
 def _cost(fit: Fit) -> float:

@@ -189,7 +189,8 @@ class EffectSearch:
         with closing(on_threads(lambda name: advance(found[name]), better, self._workers)) as results:
             found |= dict(zip(better, results, strict=True))
         promised = {
-            name: promise(each.terms, len(each.like.parameters), here.before.fit) for name, each in found.items()
+            name: promise(each.terms, each.begun, len(each.like.parameters) - len(here.before.fit.parameters))
+            for name, each in found.items()
         }
         least = min((each.cost for each in found.values()), default=0.0)
         go_on = set(sorted(better, key=lambda name: found[name].cost)[:FEWEST_GONE_ON])
