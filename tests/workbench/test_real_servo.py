@@ -56,12 +56,16 @@ def diagnosed() -> Diagnosis:
 
 
 @pytest.mark.long
-def test_friction_differs_between_the_directions(diagnosed: Diagnosis) -> None:
-    assert diagnosed.missing[:1] == ("asymmetric_friction",)
+def test_friction_differs_between_the_directions_but_break_aways_less(diagnosed: Diagnosis) -> None:
+    """The error falls to a twentieth; that it is not added is what the five break-aways say, 4 % of F_c off."""
+    (found,) = [each.model for each in diagnosed.steps[0].candidates if each.name == "asymmetric_friction"]
+    assert found is not None
     assert diagnosed.base.errors.test_rmse_m > 10.0
-    assert 0.3 < diagnosed.best.errors.test_rmse_m < 1.9
+    assert 0.3 < found.errors.test_rmse_m < 1.9
     # Viscous friction trades with it: searches that end equally low differ by 0.02.
-    assert diagnosed.best.fit.parameters["asymmetric_friction.asymmetry"].value == pytest.approx(-0.12, abs=0.02)
+    assert found.fit.parameters["asymmetric_friction.asymmetry"].value == pytest.approx(-0.12, abs=0.02)
+    assert found.breaks_elsewhere
+    assert "asymmetric_friction" not in diagnosed.missing
 
 
 @pytest.mark.long
