@@ -19,8 +19,7 @@ blocks of strokes or readings are what is independent.
 """
 
 from dataclasses import dataclass
-
-import numpy as np
+from math import log
 
 from workbench.fit.fit_result import Fit, Terms
 from workbench.select.block_errors import BlockErrors
@@ -98,9 +97,9 @@ def promise(terms: Terms, other: Terms, more: int) -> float:
 def _cost(fit: Fit) -> float:
     """Return what the parameters of a fit cost: an effect's by how little of its range is left."""
     least = _log_events(fit.terms)
-    left = dict(zip((each.name for each in fit.known.parameters), fit.known.share_left, strict=True))
-    return sum(max(least, -2.0 * np.log(left.get(name, 1.0)) if "." in name else least) for name in fit.parameters)
+    left = dict(zip((each.name for each in fit.known.parameters), fit.known.share_left.tolist(), strict=True))
+    return sum(max(least, -2.0 * log(left.get(name, 1.0)) if "." in name else least) for name in fit.parameters)
 
 
 def _log_events(terms: Terms) -> float:
-    return float(np.log(max(terms.events, 2.0)))
+    return log(max(terms.events, 2.0))
