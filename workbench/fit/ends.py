@@ -46,11 +46,20 @@ class Places:
 PLACES = Places()
 
 
-def settle(like: Likelihood, end: End) -> End:
-    """Search on where an eased search has come to, and where other onsets suit the valve better, as long as it pays."""
+def settle(like: Likelihood, end: End) -> tuple[End, ...]:
+    """Search on from the end of an eased search, by either law within moves; one end where nothing stops within them.
+
+    At low speeds a stem may creep on or stick: whether F_s holds it then, only the record can tell.
+    """
     cost = like.cost(like.at(like.theta(end.z), end.onsets_s).whole)
-    if cost != end.cost:  # the stem stops within a move
-        end = descend(like, end.z, with_onsets(like, like.theta(end.z))[0])
+    if cost == end.cost:
+        return (_settled(like, replace(end, is_eased=like.is_eased)),)
+    there = descend(like, end.z, with_onsets(like, like.theta(end.z))[0])
+    return _settled(like, there), _settled(like.eased, end)
+
+
+def _settled(like: Likelihood, end: End) -> End:
+    """Search on where other onsets suit the valve better than those that a search came to, as long as it pays."""
     for _ in range(SETTLE_ROUNDS):
         onsets_s, groups = with_onsets(like, like.theta(end.z))
         if like.cost(groups.whole) > end.cost - NATS:
@@ -70,7 +79,7 @@ def search_about(like: Likelihood, end: End) -> End:
         z, onsets_s = _cheapest(like, end, root, follow, generator)
         there = descend(like, z, onsets_s)
         if there.cost < end.cost + NATS:
-            there = settle(like, there)
+            there = _settled(like, there)
         ends.append(there)
         if there.cost < end.cost - PLACES.gain:
             end, vain = there, 0

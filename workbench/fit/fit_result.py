@@ -132,6 +132,8 @@ class Fit(Result):
     """What the record says of the coordinates of its parameters."""
     by: Sampling = DYNAMIC
     """How the recording was simulated."""
+    eased: bool = False
+    """Whether a stem that stops within a move was let go on at F_c (`sim.told`)."""
 
     @property
     def trusted(self) -> bool:
@@ -217,6 +219,7 @@ def fit_at(problem: Problem, like: Likelihood, end: End, agreement: int) -> Fit:
         load_n=problem.load_n,
         known=Known(like.parameters, determined.root),
         by=problem.by,
+        eased=like.is_eased,
     )
 
 

@@ -123,11 +123,11 @@ def _base_fit(
     composition = Composition.from_file(valve)
     like = of.likelihood(composition, free)
     first, *others = starts(like)
-    ends = [settle(like, _from_afar(like.eased, first))]
-    if not at_the_noise(ends[0].cost, like.count):
-        ends += on_threads(lambda z: settle(like, _from_afar(like.eased, z)), others, workers)
-    best = min(ends, key=lambda each: each.cost)
-    return _best(of, like, ends), not at_the_noise(best.cost, like.count)
+    ends = [*settle(like, _from_afar(like.eased, first))]
+    if not at_the_noise(_cheapest(ends).cost, like.count):
+        for each in on_threads(lambda z: settle(like, _from_afar(like.eased, z)), others, workers):
+            ends += each
+    return _best(of, like, ends), not at_the_noise(_cheapest(ends).cost, like.count)
 
 
 @linear_algebra_alone()
@@ -240,7 +240,8 @@ def finish(of: Problem, trial: Trial) -> Fit:
     """Search to the end from the best valley of a trial, and from the next if it is nearly as good."""
     like, (first, *others) = trial.like, trial.valleys
     near = [first, *(each for each in others[:1] if each.cost < NEAR * first.cost)]
-    return _best(of, like, [settle(like, descend(like.eased, each.z, each.onsets_s)) for each in near])
+    found = [settle(like, descend(like.eased, each.z, each.onsets_s)) for each in near]
+    return _best(of, like, [end for ends in found for end in ends])
 
 
 @linear_algebra_alone()
@@ -248,15 +249,21 @@ def leave_off(of: Problem, trial: Trial) -> Fit:
     """Return the fit of a trial that is not gone on with, as far as it came."""
     like, best = trial.like, trial.valleys[0]
     groups = like.at(like.theta(best.z), best.onsets_s)
-    jacobian = derivatives(like, best.z, best.onsets_s)
-    end = replace(best, cost=like.cost(groups.whole), groups=groups, jacobian=jacobian)
-    return fit_at(of, like, end, agreement=0)
+    cost = like.cost(groups.whole)
+    end = best if best.cost < cost else replace(best, cost=cost, groups=groups, is_eased=like.is_eased)
+    like = _law(like, end)
+    return fit_at(of, like, replace(end, jacobian=derivatives(like, end.z, end.onsets_s)), agreement=0)
 
 
 def problem_of(found: Fit, record: Record) -> Problem:
     """Return the problem of another record, driven and sampled as what a fit was made of; it need not move."""
     return Problem(
-        record, told_moves(record), found.by.of(record, found.valve.valve), found.from_pressure, found.load_n
+        record,
+        told_moves(record),
+        found.by.of(record, found.valve.valve),
+        found.from_pressure,
+        found.load_n,
+        found.eased,
     )
 
 
@@ -315,6 +322,17 @@ def at_the_noise(cost: float, count: int) -> bool:
 
 
 def _best(of: Problem, like: Likelihood, ends: Sequence[End]) -> Fit:
-    best = search_about(like, min(ends, key=lambda each: each.cost))
-    same = max(1, sum(each.cost <= SAME_COST * best.cost + NATS for each in ends))
-    return fit_at(of, like, best, same + 1 if at_the_noise(best.cost, like.count) else same)
+    """Return the fit of the best of these ends, searched about by each law within moves that they are of."""
+    laws = [[each for each in ends if each.is_eased == eased] for eased in (False, True)]
+    best = _cheapest([search_about(_law(like, each[0]), _cheapest(each)) for each in laws if each])
+    same = max(1, sum(each.cost <= SAME_COST * best.cost + NATS for each in laws[best.is_eased]))
+    return fit_at(of, _law(like, best), best, same + 1 if at_the_noise(best.cost, like.count) else same)
+
+
+def _cheapest(ends: Sequence[End]) -> End:
+    return min(ends, key=lambda each: each.cost)
+
+
+def _law(like: Likelihood, end: End) -> Likelihood:
+    """Return the likelihood by which a search has ended."""
+    return like.eased if end.is_eased else like

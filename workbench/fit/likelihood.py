@@ -175,6 +175,7 @@ class Likelihood:
         by: Sampling,
         from_pressure: bool = False,
         load_n: float,
+        eased: bool = False,
         weights: Weights = WEIGHTS,
     ) -> None:
         self.composition, self.record, self.parameters, self.weights = composition, record, tuple(parameters), weights
@@ -183,7 +184,7 @@ class Likelihood:
         self.layout = layout(record, self.run.moves, weights)
         self.sigma_m = record.scale_m
         self.landing_m = self.sigma_m * np.sqrt(1.0 / self.layout.per_rest + weights.landing**2)
-        self._is_eased = False
+        self.is_eased = eased
         self._last: tuple[bytes, Groups] | None = None
         self._quantum = next((i for i, each in enumerate(_guesses(composition)) if each == "quantum"), None)
 
@@ -191,7 +192,7 @@ class Likelihood:
     def eased(self) -> "Likelihood":
         """The same where static friction has no part in a move (`sim.told`): for a search that begins far off."""
         eased = copy(self)
-        eased._is_eased, eased._last = True, None
+        eased.is_eased, eased._last = True, None
         return eased
 
     @property
@@ -235,7 +236,7 @@ class Likelihood:
     def path(self, theta: Vector, onsets_s: Vector) -> ToldPath:
         """Simulate, the sensor's rounding left out."""
         rounds = np.arange(theta.size) == (-1 if self._quantum is None else self._quantum)
-        return self.run.run(np.where(rounds, 0.0, theta), onsets_s, eased=self._is_eased)
+        return self.run.run(np.where(rounds, 0.0, theta), onsets_s, eased=self.is_eased)
 
     def off_m(self, path: ToldPath, theta: Vector) -> Vector:
         """Return what a path is off by, m, (n,)."""

@@ -256,6 +256,8 @@ class End:
     groups: Groups
     jacobian: Vector
     """Of the residuals by z and onsets, (rows, parameters + moves); empty where it was not asked for."""
+    is_eased: bool = False
+    """Whether the likelihood was."""
     as_likely: tuple["End", ...] = ()
     """Other ends within the interval of 95 %."""
 
@@ -296,7 +298,7 @@ def descend(
     onsets_s = _seconds(like, found.o)
     groups = like.at(like.theta(found.z), onsets_s)
     jacobian = derivatives(like, found.z, onsets_s) if effort == WHOLE else np.empty((0, 0))
-    return End(found.z, onsets_s, like.cost(groups.whole), groups, jacobian)
+    return End(found.z, onsets_s, like.cost(groups.whole), groups, jacobian, like.is_eased)
 
 
 def derivatives(like: Likelihood, z: Vector, onsets_s: Vector) -> Vector:

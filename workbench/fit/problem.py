@@ -35,6 +35,8 @@ class Problem:
     """Whether the measured pressure drives the stem, and not the command."""
     load_n: float
     """To which a break-away tells static friction, N: of the valve as known before any fit, the same for all models."""
+    eased: bool = False
+    """Whether a stem that stops within a move goes on at F_c, as `workbench.fit.ends.settle` has found."""
 
     @property
     def by_setpoint(self) -> bool:
@@ -73,6 +75,7 @@ class Problem:
             by=self.by,
             from_pressure=self.from_pressure,
             load_n=self.load_n,
+            eased=self.eased,
         )
 
     def _free(self, composition: Composition) -> list[str]:

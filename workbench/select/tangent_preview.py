@@ -9,7 +9,7 @@ of eight (`benchmarks.first_ranking`).
 """
 
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 import numpy.typing as npt
@@ -52,9 +52,9 @@ class Tangents:
     """What a bare fit leaves, and how much of it the change that an effect makes explains."""
 
     def __init__(self, base: Fit, of: Problem) -> None:
-        self._base, self._of = base, of
+        self._base, self._of = base, replace(of, eased=base.eased)
         composition = Composition.from_file(base.valve)
-        like = of.likelihood(composition, tuple(base.parameters))
+        like = self._of.likelihood(composition, tuple(base.parameters))
         self._bare = like.at(composition.theta, base.onsets_s)
         slopes = derivatives(like, like.coordinates(composition.theta), base.onsets_s)
         ends = np.cumsum([each.size for each in self._bare])
