@@ -108,7 +108,7 @@ class Composition:
     @property
     def _either(self) -> EitherKernel:
         """Whichever kernel is there."""
-        found: EitherKernel = self._compiled.get("quasi-static") or self.kernel
+        found: EitherKernel = self._compiled.get("quasi-static") or self._compiled.get("told") or self.kernel
         return found
 
     def _kernel(self, name: str, compiled: Callable[[Sequence[Effect]], T]) -> T:

@@ -44,7 +44,7 @@ EITHER: Mapping[str, tuple[int, ...]] = {
     "rest": (VECTOR, VECTOR, NUMBER, NUMBER, NUMBER),
     "begin": (VECTOR, VECTOR, NUMBER, NUMBER, NUMBER, NUMBER),
 }
-"""Entries with and without inertia."""
+"""Entries of every kernel."""
 ENTRIES: Mapping[str, tuple[int, ...]] = {
     **EITHER,
     "respond": (VECTOR, VECTOR, VECTOR, VECTOR, NUMBER, NUMBER, MATRIX),
@@ -56,7 +56,7 @@ SLOW_ENTRIES: Mapping[str, tuple[int, ...]] = {
 
 
 TOLD_ENTRIES: Mapping[str, tuple[int, ...]] = {
-    "rest": EITHER["rest"],
+    **EITHER,
     "tell": (VECTOR, VECTOR, VECTOR, VECTOR, VECTOR, VECTOR, NUMBER, NUMBER, NUMBER, NUMBER, VECTOR, MATRIX),
 }
 
@@ -88,8 +88,8 @@ class QuasiStaticKernel(EitherKernel):
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
-class ToldKernel:
-    """`tell` of `told.py`, with the effects in their places."""
+class ToldKernel(EitherKernel):
+    """The same and `tell` of `told.py`."""
 
     tell: Entry[Vector, Vector, Vector, Vector, Vector, Vector, float, float, float, float, Vector, Vector]
 
@@ -100,8 +100,8 @@ def told_kernel(effects: Sequence[Effect]) -> ToldKernel:
     Raises:
         InputError: as `kernel`.
     """
-    _, _, compiled = _of(effects, (BASE, TOLD), TOLD_ENTRIES)
-    return ToldKernel(tell=compiled["tell"])
+    digest, _, compiled = _of(effects, (BASE, TOLD), TOLD_ENTRIES)
+    return ToldKernel(digest=digest, state_size=_state_size(effects), **compiled)
 
 
 def kernel(effects: Sequence[Effect]) -> Kernel:

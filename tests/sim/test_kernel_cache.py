@@ -16,6 +16,7 @@ from sim import kernel as compiled
 from sim import kernel_compiler
 from sim.composition import Composition
 from sim.effect import SHIPPED, read_effect
+from sim.karnopp import read
 from sim.machine_code import processor
 from sim.valve import Valve
 
@@ -190,3 +191,12 @@ def test_a_cache_that_others_may_write_to_is_made_private_and_somebody_elses_is_
     path = compiled.kernel_file("digest", "text")
     assert path.read_text() == "text"
     assert not path.is_relative_to(tmp_path)
+
+
+def test_a_search_compiles_one_kernel_a_model(monkeypatch: pytest.MonkeyPatch) -> None:
+    """A stem that is told when it moves begins by its own kernel: the other costs a fresh installation a third more."""
+    monkeypatch.setattr("sim.composition.kernel", lambda _: pytest.fail("the kernel of a free run is compiled"))
+    composition = Composition.from_file(SEED)
+    assert composition.told.tell
+    state = composition.begin(composition.theta, 0.0, 0.01, 0.0, 5e4)
+    assert read(state).x == 0.01
