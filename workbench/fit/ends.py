@@ -53,12 +53,12 @@ def settle(like: Likelihood, end: End) -> tuple[End, ...]:
     """
     cost = like.cost(like.at(like.theta(end.z), end.onsets_s).whole)
     if cost == end.cost:
-        return (_settled(like, replace(end, is_eased=like.is_eased)),)
+        return (_settle_by(like, replace(end, is_eased=like.is_eased)),)
     there = descend(like, end.z, with_onsets(like, like.theta(end.z))[0])
-    return _settled(like, there), _settled(like.eased, end)
+    return _settle_by(like, there), _settle_by(like.eased, end)
 
 
-def _settled(like: Likelihood, end: End) -> End:
+def _settle_by(like: Likelihood, end: End) -> End:
     """Search on where other onsets suit the valve better than those that a search came to, as long as it pays."""
     for _ in range(SETTLE_ROUNDS):
         onsets_s, groups = with_onsets(like, like.theta(end.z))
@@ -79,7 +79,7 @@ def search_about(like: Likelihood, end: End) -> End:
         z, onsets_s = _cheapest(like, end, root, follow, generator)
         there = descend(like, z, onsets_s)
         if there.cost < end.cost + NATS:
-            there = _settled(like, there)
+            there = _settle_by(like, there)
         ends.append(there)
         if there.cost < end.cost - PLACES.gain:
             end, vain = there, 0

@@ -53,6 +53,8 @@ class Gain:
     @property
     def rejection_reason(self) -> str:
         """What the candidate lacks to be accepted; empty if nothing."""
+        if self.bic < -self.least:
+            return f"the fitted part speaks against it: evidence {self.bic:.3g}, more than {self.least:g} needed"
         if self.bic <= self.least:
             return f"may be chance: evidence {self.bic:.3g}, more than {self.least:g} needed"
         if self.held_out_evidence <= LEAST_HELD_OUT:
