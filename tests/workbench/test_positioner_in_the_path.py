@@ -211,7 +211,7 @@ def asked(recording: Recording) -> PositionerOrPacking:
 def test_of_small_moves_it_is_never_the_other_that_is_said_to_hold_the_stem(held_by: str) -> None:
     """A few moves of two minutes do not always tell both."""
     found = asked(small_moves(SMALL[held_by]))
-    may_be = {"both": {"both", "at least packing"}, "positioner": {"positioner", "at least positioner"}}
+    may_be = {"both": {"both", "at least packing"}, "positioner": {"positioner", "at least positioner", "not told"}}
     assert found.cause in may_be[held_by]
 
 

@@ -277,7 +277,10 @@ class EffectSearch:
         return steps
 
     def _best_path(self, base: EvaluatedModel) -> tuple[str, ...]:
-        """Return what the best model adds: of those as likely as the likeliest, that with the fewest effects."""
+        """Return what the best model adds: of those as likely as the likeliest, that with the fewest effects.
+
+        Of several, the likeliest that a measured pressure does not speak against.
+        """
         found = [
             each
             for here in self._rounds.values()
@@ -289,9 +292,10 @@ class EffectSearch:
         scores = [self._score(base, each.before) for each in found]
         as_good = [each for each, score in zip(found, scores, strict=True) if score > max(scores) - LEAST_BIC]
         fewest = min(len(each.added) for each in as_good)
-        best = max(
-            (each for each in as_good if len(each.added) == fewest), key=lambda each: self._score(base, each.before)
-        )
+        of_fewest = [each for each in as_good if len(each.added) == fewest]
+        models = [each.before for each in of_fewest]
+        backed = [each for each in of_fewest if not pressure_speaks_against(each.before, models)]
+        best = max(backed or of_fewest, key=lambda each: self._score(base, each.before))
         return min(each.added for each in as_good if self._classes(each) == self._classes(best))
 
     def _classes(self, here: _Round) -> list[frozenset[str]]:
