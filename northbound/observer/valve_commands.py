@@ -55,6 +55,13 @@ def refusal_for(role: Role, *registers: str) -> str | None:
     return None
 
 
+def _is_same(one_pu: float | None, other_pu: float | None) -> bool:
+    """Whether two references that wait, or none, are one; no number is like another."""
+    if one_pu is None or other_pu is None:
+        return one_pu is other_pu
+    return abs(one_pu - other_pu) <= SAME_PU
+
+
 def _as_read(name: str, value: float) -> str:
     """Return a register's value as a person reads it; the reference in %, as it is typed."""
     if name in CODES:
@@ -109,12 +116,11 @@ class ValveCommands:
 
         def write(dcs: Dcs) -> Confirmation:
             waits_pu = waiting_reference(dcs.get_all(*WAITS))
-            if (waits_pu is None) != (seen_pu is None) or abs((waits_pu or 0.0) - (seen_pu or 0.0)) > SAME_PU:
+            if not _is_same(waits_pu, seen_pu):
                 now, then = ("none" if each is None else _as_read("reference", each) for each in (waits_pu, seen_pu))
                 return Confirmation(False, f"nothing was written: the reference that waits is {now} now, it was {then}")
             to_pu = dcs.get("reference" if goes else "position_signal")
-            to_pu = min(max(to_pu, 0.0), 1.0)
-            dcs.set_and_read_back("reference", to_pu)
+            dcs.set_and_read_back("reference", min(max(to_pu, 0.0), 1.0))
             return _confirm("mode", Mode.AUTOMATIC, dcs.set_and_read_back("mode", Mode.AUTOMATIC))
 
         return self._within_rights(role, ("reference", "mode"), write)

@@ -32,7 +32,7 @@ class Places:
 
     seed: int = 1
     draws: int = 32
-    """Of a round: one simulation each, as many as a descent of a few steps takes."""
+    """Of a round: one simulation each; sixteen left a play among few slips in a worse valley."""
     spread: float = 1.5
     """Deviations: the next valley lies beyond what this one leaves open, but not far."""
     vain: int = 2

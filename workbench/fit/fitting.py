@@ -215,7 +215,7 @@ def glimpse(
             begins = starts_by_landings(like, added, fitted, Origin(sheet), points)
             searches += [lambda z=z: _from_afar(like, z, GLIMPSE, chosen) for z in begins]  # type: ignore[misc]
     ends = list(on_threads(lambda search: search(), searches, workers))
-    best = min(ends, key=lambda each: each.cost)
+    best = _cheapest(ends)
     other_order = in_other_order(like, best.z)
     if other_order is not None and not at_the_noise(best.cost, like.count):
         onsets_s, _ = with_onsets(like, like.theta(other_order), COARSE_ROUNDS)
