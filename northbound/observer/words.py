@@ -7,6 +7,7 @@ from dataclasses import dataclass
 from config.codes import EventKind, Fault, cause_text
 from config.quantities import DeviceStatus
 from config.registers import BY_NAME, ESTIMATED, REGISTERS
+from fieldbus.canopen.emergencies import cause_of
 
 CODES = {register.name: register.codes for register in REGISTERS if register.codes is not None}
 """The code that each register of one serves."""
@@ -86,6 +87,8 @@ def in_words(register: str, value: float, values: Mapping[str, float]) -> str:
 
     >>> in_words("mode", 2, {}), in_words("b_reason", 0, {}), in_words("position", 0.5, {})
     ('automatic', 'valid', '')
+    >>> in_words("emergency", 0x2310, {}), in_words("emergency", 0, {})
+    ('0x2310: current', 'none')
     >>> in_words("eta_1", 0, {}), in_words("ne107_causes_high", 1, {}), in_words("event_cause", 2, {"event": 7})
     ('on', 'cycles or replies too slow', 'automatic')
     """
@@ -95,6 +98,8 @@ def in_words(register: str, value: float, values: Mapping[str, float]) -> str:
         return ", ".join(ne107_causes(int(value) << CAUSE_BITS[register])) or "none"
     if register == "device_status":
         return device_status(value, values.get("fault", Fault.NONE))
+    if register == "emergency":
+        return f"0x{int(value):04X}: {cause_of(int(value))}" if value else "none"
     if register == "event_cause":
         kind = int(values.get("event", EventKind.NONE))
         return cause_text(EventKind(kind), int(value)) if kind in list(EventKind) else ""

@@ -10,7 +10,7 @@ from config.registers import BY_NAME
 from northbound.observer.happened import Happened
 from northbound.observer.valve_view import ValvePicture
 from northbound.observer.waiting_reference import waiting_reference
-from northbound.observer.words import EstimateInWords, device_status, estimates_in_words, ne107_causes
+from northbound.observer.words import EstimateInWords, device_status, estimates_in_words, in_words, ne107_causes
 from webpage.units import NO_NUMBER, Unit, Units
 
 
@@ -64,7 +64,7 @@ def status(picture: ValvePicture) -> list[Fact]:
             device_status(picture.value("device_status"), picture.value("fault")),
             BY_NAME["device_status"].text,
         ),
-        Fact("CANopen's emergency", _emergency(picture.value("emergency")), BY_NAME["emergency"].text),
+        *_emergency(picture.value("emergency")),
         Fact("kept from before the restart", picture.text("restored"), BY_NAME["restored"].text),
         Fact("experiment", picture.text("experiment_state"), BY_NAME["experiment_state"].text),
     ]
@@ -149,10 +149,10 @@ def _interval(each: EstimateInWords, stroke_m: float, units: Units) -> str:
     return f"{factor * each.value:.4g} ± {factor * each.half_width:.2g} {unit}".rstrip()
 
 
-def _emergency(code: float) -> str:
-    if not math.isfinite(code):
-        return NO_NUMBER
-    return f"0x{int(code):04X}" if code else "none"
+def _emergency(code: float) -> Iterator[Fact]:
+    """Yield what a CANopen node reports: of a device on another bus, and of a healthy one, nothing."""
+    if code > 0:
+        yield Fact("CANopen's emergency", in_words("emergency", code, {}), BY_NAME["emergency"].text)
 
 
 def _count(value: float) -> str:

@@ -10,7 +10,7 @@ A staircase identifies by its landings alone. What it found is judged in the cyc
 The other estimators have no say in that, nor later: without an excitation they learn from ordinary moves, move by move.
 """
 
-from config.codes import Refusal
+from config.codes import InhibitReason, Refusal
 from positioner.control.controller_memory import ControllerMemory
 from positioner.control.excitation import ActiveExcitation
 from positioner.control.requests import Requests
@@ -36,6 +36,8 @@ def identify(
     wanted = 0 in requests.eta[1:] and _moves_count(excitation, requests, by_slides=by_slides)
     if _staircase_is_over(memory, excitation, wanted=wanted):
         broken_off = excitation is not None and (excitation.broken_off or excitation.unanswered)
+        if excitation is not None and excitation.inhibit_reason is InhibitReason.STAIRCASE_LIMITED:
+            memory.statics.refuse_as_few()
         return False, _concluded(memory, broken_off=broken_off)
     if wanted:
         begins = not memory.identifying or (excitation is not None and memory.excitation is None)

@@ -5,7 +5,7 @@ from dataclasses import replace
 
 import pytest
 
-from config.codes import Fault, InhibitReason, State
+from config.codes import Fault, InhibitReason, Refusal, State
 from config.daemon_file import DaemonFile
 from config.slave_file import SlaveFile
 from config.valve_file import load_valve, shipped_valve
@@ -54,6 +54,11 @@ def seed_valve(factor: float, at_pu: float) -> Plant:
     return Device(valve, SlaveFile.model_validate(slave), {})
 
 
+def heavy_valve(factor: float, at_pu: float) -> Plant:
+    heavy = replace(with_friction(SEED_LIKE, factor), mass_kg=60.0)
+    return OtherPlant(heavy, PERIOD_S, at_pu=at_pu, noise_std_m=1e-5)
+
+
 def other_valve(factor: float, at_pu: float) -> Plant:
     return OtherPlant(with_friction(SEED_LIKE, factor), PERIOD_S, at_pu=at_pu, noise_std_m=1e-5)
 
@@ -82,15 +87,23 @@ def test_friction_that_has_doubled_is_found(
 
 def test_a_heavy_stem_that_gives_way_before_it_slides_is_found_within_its_deviations() -> None:
     """Its slide did not count, for friction was taken up in the same rise: the staircase turned round, in vain."""
-    heavy = replace(with_friction(SEED_LIKE, 2.0), mass_kg=60.0)
-    found = identified(OtherPlant(heavy, PERIOD_S, at_pu=0.3, noise_std_m=1e-5), 420e3)
+    found = identified(heavy_valve(2.0, 0.3), 420e3)
     assert (found.fault, found.applied.count) == (Fault.NONE, 1)
-    friction_pa = heavy.coulomb_n / heavy.area_m2
+    friction_pa = 2.0 * SEED_LIKE.coulomb_n / SEED_LIKE.area_m2
     for each in (found.static_law.up, found.static_law.down):
         assert each.value == pytest.approx(friction_pa, abs=3.0 * each.std)
     assert max(found.static_law.up.std, found.static_law.down.std) < 0.05 * friction_pa
 
 
-def test_friction_that_has_tripled_is_named_where_the_pressure_does_not_suffice() -> None:
+@pytest.mark.parametrize(
+    ("plant", "maximum_pa"),
+    [(seed_valve(3.0, 0.5), 140e3), (heavy_valve(3.0, 0.3), 140e3), (heavy_valve(3.0, 0.3), 420e3)],
+)
+def test_friction_that_has_tripled_is_named_where_the_pressure_does_not_suffice(
+    plant: Plant, maximum_pa: float
+) -> None:
     """A turn needs 145 kPa: the landings are too few both ways, and it is not the valve's law that is crooked."""
-    assert excited(seed_valve(3.0, 0.5), 140e3).decision.inhibit_reason is InhibitReason.STAIRCASE_LIMITED
+    loop = excited(plant, maximum_pa)
+    assert loop.decision.inhibit_reason is InhibitReason.STAIRCASE_LIMITED
+    loop.end()
+    assert loop.decision.static_law.reason is Refusal.LANDINGS_TOO_FEW

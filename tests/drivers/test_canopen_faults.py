@@ -22,7 +22,6 @@ from drivers.boundary import BadReply, DriverError, NoConnection, NoNumber, NoRe
 from drivers.canopen import pdo, watcher
 from drivers.canopen.driver import CanopenDriver
 from drivers.canopen.events import NodeEvent
-from drivers.canopen.watcher import cause_of
 from fieldbus.canopen.loopback import free_channel
 from fieldbus.canopen.objects import NodeState
 from sim.slave import canopen_slave
@@ -529,17 +528,3 @@ def test_a_remote_frame_for_a_tpdo_is_no_node_clash(driver: CanopenDriver, third
         third.send(asks)
         third.send(says(code))
         in_time(partial(shows, driver, code))  # the remote frame has come when this one has
-
-
-@pytest.mark.parametrize(
-    ("code", "cause"),
-    [
-        (0x8130, "life guard or heartbeat error"),
-        (0x8199, "communication"),
-        (0x2310, "current"),
-        (0xFF42, "specific to the device"),
-        (0x0300, "not in CiA 301"),
-    ],
-)
-def test_an_emergency_is_told_by_its_cause(code: int, cause: str) -> None:
-    assert cause_of(code) == cause

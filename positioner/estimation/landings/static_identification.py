@@ -85,6 +85,10 @@ class StaticIdentification:
         self._elsewhere = 0
         self.law: StaticLaw = no_static_law(Refusal.LANDINGS_TOO_FEW)
 
+    def refuse_as_few(self) -> None:
+        """Say of a law that is refused that its landings are too few: what they lie on is then not known."""
+        self.law = no_static_law(Refusal.LANDINGS_TOO_FEW, self.law.slides)
+
     def restore(self, landings: Iterable[SlideOutcome], held: tuple[SlideOutcome, ...], answers: Answers) -> None:
         """Remember what was known before a restart; the latest first, times negative."""
         self.restart()
