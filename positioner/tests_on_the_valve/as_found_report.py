@@ -178,10 +178,10 @@ class ValveReport:
         return {name: figure for name, figure in told.items() if name in looked_at and figure.value is not None}
 
     def _shown(self, quantity: Quantity | None, record: Record) -> str:
-        """Return a figure as it is shown, marked where it is off what is recommended."""
+        """Return a figure as it is shown, marked where it is off what is recommended, other than by the test itself."""
         if quantity is None:
             return "-"
-        wanted = replace(quantity, figure=self._recommended(quantity))
+        wanted = replace(quantity, figure=self._recommended(replace(quantity, expected=None)))
         marked = Change(quantity, wanted, span_of(quantity.name, record.outcome)).is_off_by(THRESHOLDS.off)
         return f"{quantity.shown} *" if marked else quantity.shown
 

@@ -213,3 +213,12 @@ def test_what_the_file_says_is_recommended() -> None:
         "bench_high_pa": pytest.approx(100e3),
     }
     assert recommended_by(daemon_file()) == {"travel_m": STROKE_M}
+
+
+def test_what_a_test_asked_for_is_shown_and_judged_by_its_verdict_alone(tmp_path: Path) -> None:
+    """A partial stroke of 10 % that turned at 11.2 % has passed; what somebody else recommends is marked."""
+    reached = Quantity("reached_m", "travel reached", "m", Figure(4.48e-3, 1e-6), expected=4e-3)
+    keep(tmp_path, Outcome("pst", "FV-1", (reached,), (ValveTestVerdict.PASSED,)), "as_found", 1e9, {})
+    for asked, shown in ({}, "4.4800 ± 0.0010 mm"), ({"reached_m": 4e-3}, "4.4800 ± 0.0010 mm *"):
+        (row,) = ValveReport("FV-1", records(tmp_path), recommended=asked).table("pst").rows[1:]
+        assert row[1:] == ("4 mm", shown)
