@@ -40,7 +40,7 @@ from positioner.daemon.cycle import Cycle
 from positioner.daemon.link import Link, LinkSettings
 from positioner.daemon.pacing import DevicePace
 from positioner.daemon.snapshot import Snapshot
-from positioner.testing.spoiler import Spoiler
+from positioner.testing.wire_faults import Spoiler
 from sim.slave.clocks import Lockstep
 from sim.slave.modbus_slave import device_of
 from sim.slave.simulated_device import Device

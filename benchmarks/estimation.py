@@ -17,7 +17,7 @@ from positioner.estimation.algebraic import Identifier
 from positioner.estimation.batch import BatchSettings, identify
 from positioner.estimation.online import READINGS
 from positioner.estimation.refiner import InProcessRefiner, Refinement, RefinementJob
-from positioner.estimation.weighted import CHAINS, ROWS, Feeds, kernel
+from positioner.estimation.weighted_least_squares import CHAINS, ROWS, Feeds, kernel
 from sim.valve import Valve
 
 SAMPLES = 800

@@ -1,6 +1,6 @@
 """A simulated device in lockstep on each bus, its wire spoilt on demand: what `benchmarks.campaign` tries.
 
-Kinds of fault are those of `positioner.testing.spoiler`.
+Kinds of fault are those of `positioner.testing.wire_faults`.
 
 Modbus TCP through a proxy that knows frames, on TLS through one that knows records, all that a wire sees there: one
 that is spoilt ends the session, and those of a handshake are spoilt, too. RTU through a line that carries whole frames;
@@ -26,7 +26,7 @@ from fieldbus.canopen.loopback import free_channel
 from fieldbus.modbus.server import RegisterServer
 from fieldbus.modbus.tls import Guard
 from positioner.testing.fault_proxy import spoilt_wire
-from positioner.testing.spoiler import WIRE_FAULTS, Spoiler
+from positioner.testing.wire_faults import WIRE_FAULTS, Spoiler
 from sim.slave import canopen_slave
 from sim.slave.canopen_slave import NodeServer
 from sim.slave.clocks import Clock

@@ -31,7 +31,7 @@ from fieldbus.modbus.client import ModbusClient
 from positioner.cli.parts.children import port_in
 from positioner.control.valve_knowledge import ValveKnowledge
 from positioner.daemon.health.health_file import read_record
-from positioner.daemon.memory.conditions import conditions_of
+from positioner.daemon.memory.known_configuration import conditions_of
 from positioner.daemon.memory.memory_file import SET_ASIDE, read_memory, write_memory
 from positioner.dcs import Dcs, DcsError
 from positioner.estimation.acceptance import Ratios

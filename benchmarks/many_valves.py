@@ -32,7 +32,7 @@ from config.codes import Fault
 from config.daemon_file import load_valves
 from config.errors import InputError
 from config.modbus_map import SIMULATED_MAP
-from fieldbus.modbus.layout import layout
+from fieldbus.modbus.register_packing import layout
 from positioner.cli.parts.children import port_in
 from positioner.daemon.cycle_load import in_memory_s
 from positioner.daemon.pacing import raise_above_cycles

@@ -21,7 +21,7 @@ from config.roles import Role
 from config.tls_table import Tls
 from drivers import driver_for
 from fieldbus.modbus.tls import client_context
-from positioner.cli.parts.authority import Authority, Owner
+from positioner.cli.parts.trial_authority import Authority, Owner
 from positioner.control.controller import Controller
 from positioner.control.settings import Settings
 from positioner.daemon.cycle import Cycle

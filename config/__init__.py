@@ -10,7 +10,7 @@ Its files:
     extended_valve                                a valve file worked out for the controller
     loading, writing, plain_file                  reads such a file; writes a valve's; what may be read at all
     file_kinds                                    which of these a file is, where another is asked for
-    file_stem                                     what the names of a valve's files begin with
+    file_prefix                                   what the names of a valve's files begin with
     json_value                                    a result as JSON has it, which knows no NaN
     toml_text                                     keys given new values in a text whose comments stay
     whole_file, lock_file                         replaces a file, or fills a folder, whole or not at all; a lock

@@ -3,7 +3,7 @@
 import re
 from pathlib import Path
 
-from config.file_stem import file_stem
+from config.file_prefix import file_stem
 
 COLUMNS = (
     "time_s",

@@ -7,7 +7,7 @@ from dataclasses import fields
 from pathlib import Path
 
 from config.codes import CAUSES, AlarmState, Code, EventKind, Ne107Cause, Ne107Status, Refusal, ValveTestVerdict
-from northbound.observer.words import CODES
+from northbound.observer.register_words import CODES
 from positioner.control.laws.slides.states import State
 from positioner.control.laws.slides.transitions import COMMANDING, TABLE
 from positioner.control.permissives import PERMISSIVES

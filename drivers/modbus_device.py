@@ -25,8 +25,8 @@ from config.device import ModbusDevice
 from config.modbus_map import Place, Run, without_holes
 from drivers.boundary import BadReply, Capabilities, DriverError, NoNumber, NoReply, Reading, Refused
 from fieldbus.modbus.exception_codes import exception_text
-from fieldbus.modbus.layout import layout
 from fieldbus.modbus.pdu import encoded
+from fieldbus.modbus.register_packing import layout
 
 OF_A_GATEWAY = (ExcCodes.GATEWAY_PATH_UNAVIABLE, ExcCodes.GATEWAY_NO_RESPONSE)
 """Exceptions that the device did not send: it may be away, or be restarted meanwhile."""

@@ -9,7 +9,7 @@ from pathlib import Path
 
 from config.roles import Role
 from config.tls_table import Tls
-from positioner.cli.parts.authority import Authority, Owner
+from positioner.cli.parts.trial_authority import Authority, Owner
 
 HERE = ("127.0.0.1",)
 LONG_AGO = datetime.now(UTC) - timedelta(days=100)

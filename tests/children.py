@@ -28,7 +28,7 @@ FORKS.set_forkserver_preload(
         "drivers.modbus_tcp",
         "drivers.modbus_rtu",
         "drivers.canopen.driver",
-        "sim.slave.loaded",
+        "sim.slave.kernel_preloading",
     ]
 )
 

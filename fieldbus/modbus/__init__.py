@@ -7,6 +7,6 @@ Its files:
     client, client_errors                   asks on TCP; why there is no reply
     framing, host_address                   how frames lie in its stream; where its server is
     serial_line, terminal, rtu              the serial line, what it is on POSIX, and the frames on it
-    pdu, exception_codes, layout            what frames carry; how a refusal is said; values in registers
+    pdu, exception_codes, register_packing  what frames carry; how a refusal is said; values in registers
     tls, client_roles                       Modbus/TCP Security: mutual TLS; who a client is, and what its role permits
 """

@@ -11,7 +11,7 @@ from typing import NamedTuple
 
 from config.codes import Mode, Quality
 from config.registers import JITTER_BOUNDS_S, REQUESTERS
-from northbound.observer.words import CODES, NORMAL_95
+from northbound.observer.register_words import CODES, NORMAL_95
 
 Labels = tuple[tuple[str, str], ...]
 

@@ -6,8 +6,8 @@
     freshness                       whether what was read last is still so
     waiting_reference               a reference that automatic will follow, and who wrote it
     trends                          the last minutes, with their gaps, and the states as bands
-    happened                        what has happened, from the daemon's history or as seen, each thing once
-    words                           codes, causes and estimates in words
+    valve_events                    what has happened, from the daemon's history or as seen, each thing once
+    register_words                  codes, causes and estimates in words
     poller                          reads a daemon in a thread of its own
     watched_valves                  the valves that somebody looks at, their pollers and connections
     last_moves                      the last minutes as a recording, and the response figures of their steps
@@ -16,7 +16,7 @@
     valve_tests                     tests begun by who watches: consent, the command in a process, breaking off
 """
 
-from northbound.observer.happened import SeenEvent
+from northbound.observer.valve_events import SeenEvent
 from northbound.observer.valve_view import ValvePicture, ValveView
 
 __all__ = ["SeenEvent", "ValvePicture", "ValveView"]

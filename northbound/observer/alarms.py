@@ -5,7 +5,7 @@ from dataclasses import dataclass
 
 from config.alarm_advice import ADVICE
 from config.codes import AlarmState, Ne107Cause
-from northbound.observer.words import code_text
+from northbound.observer.register_words import code_text
 
 BITS = ("alarms_active", "alarms_unacknowledged", "alarms_shelved")
 """Registers whose bit n - 1 is cause n."""

@@ -6,7 +6,7 @@ from dataclasses import dataclass
 
 from config.codes import ExperimentState, Fault, Mode, State
 from northbound.observer.freshness import news_within_s
-from northbound.observer.words import code_text
+from northbound.observer.register_words import code_text
 
 IDENTIFY_READS = ("mode", "fault", "sample_age", "period", "state", "experiment_state")
 """Registers that decide."""

@@ -13,9 +13,9 @@ from config.errors import CommandFailed, InputError
 from config.registers import register_named
 from config.roles import Role
 from northbound.observer.permissives import identify_permissives
+from northbound.observer.register_words import CODES, code_text
 from northbound.observer.valve_view import ValvePicture
 from northbound.observer.waiting_reference import SAME_PU, WAITS, waiting_reference
-from northbound.observer.words import CODES, code_text
 from positioner.dcs import Dcs
 
 FLOAT32_ERROR = 1e-6

@@ -12,9 +12,9 @@ from threading import Lock
 
 from config.recording import Column
 from northbound.observer.freshness import Freshness, FreshnessMemory, after_failure, after_reading, freshness
-from northbound.observer.happened import SeenEvent, read_event
+from northbound.observer.register_words import code_text
 from northbound.observer.trends import Trend
-from northbound.observer.words import code_text
+from northbound.observer.valve_events import SeenEvent, read_event
 from positioner.history.entries import Event
 
 TREND_S = 600.0

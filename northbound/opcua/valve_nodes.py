@@ -12,7 +12,7 @@ from typing import NamedTuple
 
 from config.registers import BY_NAME
 from northbound.observer import ValvePicture
-from northbound.observer.words import CODES, IDENTIFIED, code_text, estimates_in_words
+from northbound.observer.register_words import CODES, IDENTIFIED, code_text, estimates_in_words
 from northbound.opcua.device_health import device_health
 
 PERCENT = 100.0  # of a share

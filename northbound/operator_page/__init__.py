@@ -8,7 +8,7 @@ Its files:
     command                 `positioner page`
     page                    the page of one tab: all valves, or one in full
     overview, valve_panel   a card a valve; all of one
-    marks                   how things are stressed: grey, NE 107, a fault
+    status_marks            how things are stressed: grey, NE 107, a fault
     charts                  what the charts share
     trend_plot              reference, position and pressure as they come, the states as bands
     recorded_plot           the last minutes as recorded, to zoom into
@@ -19,5 +19,5 @@ Its files:
     test_card               tests on the valve: begun with consent, broken off, reported
     moves_ahead             what a command is going to do
     question_dialog         the question before it is given
-    facts                   what is said of a valve, a line each
+    valve_facts             what is said of a valve, a line each
 """

@@ -7,8 +7,8 @@ from nicegui import ui
 
 from northbound.observer.valve_view import ValvePicture
 from northbound.observer.watched_valves import WatchedValve
-from northbound.operator_page.facts import condition, figures
-from northbound.operator_page.marks import grey, mark_ne107
+from northbound.operator_page.status_marks import grey, mark_ne107
+from northbound.operator_page.valve_facts import condition, figures
 from webpage.units import Units
 
 LINES = ("reference", "pressure", "mode", "state", "fault")

@@ -14,9 +14,9 @@ from nicegui import app, ui
 
 from config.passwords import SignIn
 from northbound.observer.watched_valves import Place, WatchedValve, watching
-from northbound.operator_page.marks import STYLE, SignOfLife
 from northbound.operator_page.overview import Overview
 from northbound.operator_page.signed_in import SignedIn
+from northbound.operator_page.status_marks import STYLE, SignOfLife
 from northbound.operator_page.valve_controls import Door
 from northbound.operator_page.valve_panel import ValvePanel
 from webpage.messages import aside

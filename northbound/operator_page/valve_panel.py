@@ -1,4 +1,4 @@
-"""One valve in full. Every word comes from `facts` and what that stands on; here it is only put in its place."""
+"""One valve in full. Every word comes from `valve_facts` and what that stands on; here it is only put in its place."""
 
 import time
 from collections.abc import Callable, Iterable
@@ -6,21 +6,21 @@ from collections.abc import Callable, Iterable
 from nicegui import ui
 
 from config.results.block import as_html
-from northbound.observer.happened import WhatHappened, what_happened
 from northbound.observer.last_moves import LastMoves, last_moves
 from northbound.observer.valve_commands import Confirmation
+from northbound.observer.valve_events import WhatHappened, what_happened
 from northbound.observer.valve_view import ValvePicture
 from northbound.observer.watched_valves import WatchedValve
-from northbound.operator_page import facts
+from northbound.operator_page import valve_facts
 from northbound.operator_page.alarm_card import AlarmCard
-from northbound.operator_page.facts import Fact
 from northbound.operator_page.friction_plot import FrictionPlot
-from northbound.operator_page.marks import grey, mark_fault, mark_ne107
 from northbound.operator_page.recorded_plot import RecordedPlot
 from northbound.operator_page.signed_in import SignedIn
+from northbound.operator_page.status_marks import grey, mark_fault, mark_ne107
 from northbound.operator_page.test_card import TestCard
 from northbound.operator_page.trend_plot import WINDOWS_S, TrendPlot
 from northbound.operator_page.valve_controls import Controls
+from northbound.operator_page.valve_facts import Fact
 from webpage.messages import aside, heading
 from webpage.theme import Theme
 from webpage.units import Units
@@ -92,8 +92,8 @@ class ValvePanel:
         self._stale.set_text(picture.freshness.daemon and f"Not live: {picture.freshness.daemon}")
         self._stale.set_visibility(not picture.freshness.live)
         grey(self._body, not picture.freshness.live)
-        self._waiting.set_text(facts.waiting(picture, self.valve.view.stroke_m, self._units))
-        for name, text in facts.figures(picture, self.valve.view.stroke_m, self._units).items():
+        self._waiting.set_text(valve_facts.waiting(picture, self.valve.view.stroke_m, self._units))
+        for name, text in valve_facts.figures(picture, self.valve.view.stroke_m, self._units).items():
             self._figures[name].set_text(text)
         for name in ("position", "pressure"):
             grey(self._figures[name], not picture.freshness.measured_live)
@@ -102,11 +102,11 @@ class ValvePanel:
 
     def refresh(self, picture: ValvePicture) -> None:
         """Show what a person reads slowly."""
-        self._status.show(facts.status(picture))
-        self._wear.show(facts.wear(picture, self._units))
+        self._status.show(valve_facts.status(picture))
+        self._wear.show(valve_facts.wear(picture, self._units))
         self._friction.refresh()
-        self._cycle.show(facts.cycle(picture))
-        self._estimates.show(facts.estimates(picture, self.valve.view.stroke_m, self._units))
+        self._cycle.show(valve_facts.cycle(picture))
+        self._estimates.show(valve_facts.estimates(picture, self.valve.view.stroke_m, self._units))
         self._controls.show(picture)
         self._alarms.show(picture)
         self._tests.show(picture)
@@ -141,13 +141,13 @@ class ValvePanel:
                 self._fault = ui.label().classes("figure").props('data-testid="fault"')
 
     def _condition(self, picture: ValvePicture) -> None:
-        letter, words, causes = facts.condition(picture)
+        letter, words, causes = valve_facts.condition(picture)
         self._mode.set_text(f"{picture.text('mode')}, {picture.text('state')}")
         self._ne107.set_text(words)
         mark_ne107(self._ne107, letter)
         self._causes.set_text("; ".join(causes))
         self._fault.set_text(picture.text("fault"))
-        mark_fault(self._fault, facts.is_faulty(picture))
+        mark_fault(self._fault, valve_facts.is_faulty(picture))
 
     def _trend(self, theme: Theme) -> None:
         with ui.card().classes("full-width"):
@@ -193,7 +193,7 @@ class ValvePanel:
         self._history_source.set_text(happened.source)
         self._history_rows.clear()
         with self._history_rows:
-            for line in facts.list_events(happened.lines):
+            for line in valve_facts.list_events(happened.lines):
                 with ui.element("li"):
                     ui.label(line)
 

@@ -32,7 +32,7 @@ def run(arguments: argparse.Namespace) -> int:
     Raises:
         InputError: a host name that is none; a folder that is not empty, or cannot be written.
     """
-    from positioner.cli.parts.authority import Authority, Owner
+    from positioner.cli.parts.trial_authority import Authority, Owner
 
     hosts = tuple(arguments.host or HERE)
     for host in hosts:

@@ -38,9 +38,9 @@ def run(arguments: argparse.Namespace) -> int:
 def _certificate(file: "DaemonFile", folder: Path) -> "Certificate | Refused":
     from positioner.control.laws.slides.certificate import Refused, certified, known_valve
     from positioner.control.laws.slides.slide_law import SlideSettings
-    from positioner.daemon.kept_alone import MEMORY, valve_file_path
-    from positioner.daemon.memory.conditions import conditions_of
+    from positioner.daemon.memory.known_configuration import conditions_of
     from positioner.daemon.memory.memory_file import look_at
+    from positioner.daemon.sole_daemon import MEMORY, valve_file_path
 
     if file.control.law != "slides":
         raise InputError("control.law", f'allowed is "slides", whose landings can be bounded, got {file.control.law!r}')

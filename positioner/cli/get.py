@@ -21,7 +21,7 @@ def run(arguments: argparse.Namespace) -> int:
     """Print the values."""
 
     from config.json_value import json_value
-    from northbound.observer.words import in_words
+    from northbound.observer.register_words import in_words
 
     names = arguments.names or list(BY_NAME)
     for name in names:

@@ -33,7 +33,7 @@ def run(arguments: argparse.Namespace) -> int:
     """Print it."""
 
     from config.json_value import json_value
-    from northbound.observer.words import in_words
+    from northbound.observer.register_words import in_words
 
     days = _days(arguments)
     with connect_dcs(arguments) as dcs:
@@ -53,7 +53,7 @@ def _days(arguments: argparse.Namespace) -> "tuple[OperationDay, ...]":
     """Return the days that the daemon keeps; none without its file."""
     from config.daemon_file import load_daemon
     from positioner.daemon.health.health_file import kept_days
-    from positioner.daemon.kept_alone import HEALTH, valve_file_path
+    from positioner.daemon.sole_daemon import HEALTH, valve_file_path
 
     if arguments.config is None:
         return ()

@@ -59,7 +59,7 @@ def run(arguments: argparse.Namespace) -> int:
 
 def unfit(reading: "Reading") -> str:
     """Return what the device says of itself that is a fault; empty where it is well."""
-    from northbound.observer.words import device_status
+    from northbound.observer.register_words import device_status
     from positioner.control.supervision import UNFIT_STATUS
 
     if reading.status & UNFIT_STATUS:

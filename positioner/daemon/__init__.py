@@ -21,7 +21,7 @@ own. They meet only in immutable snapshots that are replaced whole: the cycle wa
     refinement_process            fits in a process of its own
     recorder, logs                recordings and log lines, written beside the cycle
     recording_compression         closed recordings compressed, in a process of its own
-    memory, kept_alone            what is known of a valve, kept over restarts; that one daemon keeps it
+    memory, sole_daemon           what is known of a valve, kept over restarts; that one daemon keeps it
     keeping_thread                one thread that keeps, for all valves
     cycle_statistics, health      how punctual it is; how the valve is (NAMUR NE 107)
     alarms                        who has seen what calls for somebody, by ISA-18.2

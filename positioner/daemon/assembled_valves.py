@@ -37,16 +37,16 @@ from positioner.daemon.history import HistoryKeeper
 from positioner.daemon.history.decision_events import Happened
 from positioner.daemon.history.health_hours import HealthLook
 from positioner.daemon.keeping_thread import Keeping
-from positioner.daemon.kept_alone import keep_alone
 from positioner.daemon.link import Link, LinkSettings
 from positioner.daemon.local_switch import locks_out
 from positioner.daemon.logs import log_event, logging_valve
 from positioner.daemon.memory import MemoryKeeper, StoredMemory
-from positioner.daemon.memory.conditions import conditions_of, pressure_scales
+from positioner.daemon.memory.known_configuration import conditions_of, pressure_scales
 from positioner.daemon.pacing import DevicePace, Pace, RealTimePace, prepare_process, raise_above_cycles
 from positioner.daemon.recorder import Recorder
 from positioner.daemon.refinement_process import RefinementProcess
 from positioner.daemon.service_state import service_state
+from positioner.daemon.sole_daemon import keep_alone
 from positioner.daemon.supervisory_registers import SupervisoryRegisters
 from positioner.history.kept_tests import last_tested_s, records_folder
 

@@ -24,7 +24,7 @@ from typing import Protocol
 from config.drive import COLUMNS as OF_KIND
 from config.drive import VALVE, Kind
 from config.errors import explain_failure
-from config.file_stem import file_stem
+from config.file_prefix import file_stem
 from config.recorder_files import COLUMNS, files_of_stem, find_compressed_twins, number_of
 from positioner.daemon.logs import log_event
 from positioner.daemon.recording_compression import Compression, half_done

@@ -4,7 +4,7 @@
 time comes in with the samples.
 
     online, sample_window, estimates, acceptance    sample by sample; the estimates, and which of them are applied
-    algebraic, weighted, validity                   the seed's identifier, solved with weights, and what is valid of it
+    algebraic, weighted_least_squares, validity     the seed's identifier, solved with weights, and what is valid of it
     derivatives, friction_estimator                 velocity and acceleration; what the acceleration leaves for friction
     motion_detector, running_noise                  does the stem move; the noise of its sensor
     recording_estimates, batch                      from a whole recording: find its motions, fit them, check the fit
@@ -14,7 +14,8 @@ time comes in with the samples.
     motion_preparation, linear_problem              its rows and its least squares
     stem_response, array                            the stem's exact response, which is fitted; the type of all arrays
     landings                                        the static law, from where slides end in rest
-    refiner, passive, breakaway_force               who runs a fit; from ordinary moves, one after another; F_s/A
+    refiner, passive_identification                 who runs a fit; from ordinary moves, one after another
+    breakaway_force                                 F_s/A
 """
 
 from config.codes import Refusal

@@ -30,7 +30,7 @@ from math import comb, factorial
 import numpy as np
 
 from positioner.estimation.array import Array
-from positioner.estimation.weighted import CHAINS, LEVELS, ROWS, Solution, Window, solve
+from positioner.estimation.weighted_least_squares import CHAINS, LEVELS, ROWS, Solution, Window, solve
 
 STATES = LEVELS * len(CHAINS)
 FEEDS = 8

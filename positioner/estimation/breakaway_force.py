@@ -6,7 +6,7 @@ the interval, value -+ sqrt(3) std. A mean of events would not do: pressures tha
 agree with each other, and on nothing that is true. Intervals that share nothing, as the friction or the sensors vary,
 leave what lies between them.
 
-Between two events the friction may have walked, as in `passive`: the interval widens.
+Between two events the friction may have walked, as in `passive_identification`: the interval widens.
 """
 
 from math import hypot, isfinite, sqrt

@@ -7,9 +7,9 @@ unused. The estimates are one derivative window old for that, and say so by `tim
 
 Where somebody refines (`Refinement`), the samples since the restart are to be fitted by maximum likelihood when the
 window is complete: a job, which is taken (`taken_job`). The progress stays short of 1 until the result is back: it
-replaces the algebraic one if it is acceptable. With
-eta_1 = 1 (`passive`), no excitation will fill a window: each ordinary move goes out when the stem has come to rest,
-with the posterior of the moves before it as the prior (`passive`).
+replaces the algebraic one if it is acceptable. With eta_1 = 1 (`passive_identification`), no excitation will fill a
+window: each ordinary move goes out when the stem has come to rest, with the posterior of the moves before it as the
+prior (`passive_identification`).
 """
 
 from collections import deque
@@ -27,12 +27,12 @@ from positioner.estimation.derivatives import Derivatives
 from positioner.estimation.estimates import NO_BREAKAWAY, Directions, Estimate, Estimates, no_estimate, no_estimates
 from positioner.estimation.friction_estimator import RunningMeans
 from positioner.estimation.motion_detector import MotionDetector, motion_start
-from positioner.estimation.passive import MovesPosterior, posterior_after
+from positioner.estimation.passive_identification import MovesPosterior, posterior_after
 from positioner.estimation.refiner import Refinement, RefinementJob
 from positioner.estimation.running_noise import PositionNoise
 from positioner.estimation.sample_window import SampleWindow
 from positioner.estimation.validity import ValidityCheck
-from positioner.estimation.weighted import Solution
+from positioner.estimation.weighted_least_squares import Solution
 
 READINGS = 16
 """Times per window at which (13) is solved."""

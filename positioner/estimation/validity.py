@@ -18,7 +18,7 @@ from config.codes import Refusal
 from positioner.estimation.array import Array
 from positioner.estimation.estimates import Estimate
 from positioner.estimation.friction_estimator import Means, friction
-from positioner.estimation.weighted import Solution
+from positioner.estimation.weighted_least_squares import Solution
 
 LARGEST_MISFIT = 5.0
 """Beyond this the samples of the window are not those of the model: a sensor that jumped leaves far more ..."""

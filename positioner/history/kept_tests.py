@@ -9,7 +9,7 @@ from pathlib import Path
 
 from config.codes import ValveTestVerdict
 from config.daemon_file import DaemonFile
-from config.file_stem import file_stem
+from config.file_prefix import file_stem
 
 FOLDER = "tests"
 NO_TEST = frozenset({ValveTestVerdict.BROKEN_OFF, ValveTestVerdict.UNDETERMINED})

@@ -12,5 +12,5 @@ Its files:
     tied                         in a child: be a module, and end with whoever started it
     forked, fork_server          such a process forked off one that has loaded all it needs; that one
     agent                        in a child: asks a device or a daemon for a test
-    fault_proxy, spoiler         in a child: a wire for Modbus TCP that is spoilt on demand; how
+    fault_proxy, wire_faults     in a child: a wire for Modbus TCP that is spoilt on demand; how
 """

@@ -14,7 +14,7 @@ from collections.abc import Iterator
 from contextlib import contextmanager, suppress
 from threading import Thread
 
-from positioner.testing.spoiler import WIRE_FAULTS, Spoiler
+from positioner.testing.wire_faults import WIRE_FAULTS, Spoiler
 
 HEADER = struct.Struct(">HHHB")
 

@@ -25,7 +25,7 @@ LOADED = (
     "positioner.testing.agent",
     "drivers.modbus_tcp",
     "sim.slave.modbus_slave",
-    "sim.slave.loaded",
+    "sim.slave.kernel_preloading",
 )
 CHILD_LOOK_EVERY_S = 0.005
 

@@ -68,7 +68,7 @@ class FaultProxy:
     process: ChildProcess
 
     def spoil(self, kind: str, count: int = 1, late_s: float = 0.5) -> None:
-        """Spoil the next replies, or requests; `positioner.testing.spoiler` lists the kinds.
+        """Spoil the next replies, or requests; `positioner.testing.wire_faults` lists the kinds.
 
         Raises:
             NotDone: no such kind.

@@ -9,5 +9,5 @@ Its files:
     modbus_slave, rtu_server                  served on TCP; on a serial line
     canopen_dictionary, canopen_node          laid out for CANopen; the node as pure logic
     canopen_slave                             the node on its bus
-    loaded                                    what takes a slave the longest to load, for one that is forked
+    kernel_preloading                         what takes a slave the longest to load, for one that is forked
 """

@@ -8,9 +8,9 @@ import pytest
 from config.daemon_file import DaemonFile, load_valves
 from positioner.cli.main import main
 from positioner.control.valve_knowledge import ValveKnowledge
-from positioner.daemon.kept_alone import MEMORY, valve_file_path
-from positioner.daemon.memory.conditions import conditions_of
+from positioner.daemon.memory.known_configuration import conditions_of
 from positioner.daemon.memory.memory_file import write_memory
+from positioner.daemon.sole_daemon import MEMORY, valve_file_path
 from positioner.estimation.acceptance import Ratios
 from positioner.estimation.landings.breakaway_distance import BreakawayDistance, Interval
 from positioner.estimation.landings.landing_detector import SlideOutcome

@@ -20,8 +20,8 @@ from config.tls_table import Tls
 from northbound.observer.watched_valves import Place, watching
 from positioner.cli import doctor
 from positioner.cli.main import main
-from positioner.cli.parts.authority import Authority, Owner
 from positioner.cli.parts.children import port_in
+from positioner.cli.parts.trial_authority import Authority, Owner
 from positioner.dcs import Dcs
 from tests.children import ended, running
 from tests.cli.test_daemon_process import LAW, until

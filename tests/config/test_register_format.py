@@ -6,7 +6,7 @@ import struct
 import pytest
 
 from config.register_format import Format, Order, WireType
-from fieldbus.modbus.layout import Layout
+from fieldbus.modbus.register_packing import Layout
 
 
 @pytest.mark.parametrize(

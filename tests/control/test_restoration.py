@@ -17,7 +17,7 @@ from positioner.control.sample import Sample
 from positioner.control.settings import Settings
 from positioner.control.valve_knowledge import ValveKnowledge
 from positioner.daemon.cycle import Cycle
-from positioner.daemon.memory.conditions import changed, conditions_of
+from positioner.daemon.memory.known_configuration import changed, conditions_of
 from positioner.estimation.acceptance import Ratios
 from positioner.virtual.virtual_cycle import run_identification, virtual_cycle
 from sim.effect import FINE_STEP_S

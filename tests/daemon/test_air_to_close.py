@@ -12,7 +12,7 @@ from config.slave_file import load_slave
 from config.travel import Travel
 from config.valve_file import shipped_valve
 from positioner.control.requests import Requests
-from positioner.daemon.memory.conditions import conditions_of
+from positioner.daemon.memory.known_configuration import conditions_of
 from positioner.daemon.supervisory_registers import SupervisoryRegisters
 from positioner.virtual.virtual_cycle import run_identification, virtual_cycle
 from sim.slave.modbus_slave import device_of

@@ -10,7 +10,7 @@ from scipy.integrate import solve_ivp
 from scipy.linalg import expm
 
 from positioner.estimation.algebraic import Identifier
-from positioner.estimation.weighted import Solution
+from positioner.estimation.weighted_least_squares import Solution
 from tests.cases import few_always
 from tests.estimation.stem import (
     AREA,

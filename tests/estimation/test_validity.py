@@ -5,7 +5,7 @@ import pytest
 
 from config.codes import Refusal
 from positioner.estimation.validity import ValidityCheck
-from positioner.estimation.weighted import Solution
+from positioner.estimation.weighted_least_squares import Solution
 
 CHECK = ValidityCheck(0.05, 1e-5, 10.0, 0.1)
 THETA = np.array((-450.0, -38608.0, 0.0474))

@@ -10,7 +10,7 @@ from config.device import ModbusRtuDevice
 from config.errors import InputError
 from config.loading import SHIPPED
 from config.serial_port import SerialPort
-from fieldbus.modbus.layout import layout
+from fieldbus.modbus.register_packing import layout
 from fieldbus.modbus.rtu import framed, is_whole
 
 

@@ -14,7 +14,7 @@ from northbound.observer.freshness import Freshness
 from northbound.observer.valve_commands import BrokenOff, Confirmation, ValveCommands
 from northbound.observer.valve_view import ValvePicture
 from positioner.dcs import Dcs, DcsError
-from tests.observer.test_words import READY
+from tests.observer.test_register_words import READY
 
 
 class Daemon:

@@ -26,8 +26,8 @@ from workbench.page.background import Limits, News, Raced, Work, run_diagnosis
 from workbench.page.command_lines import command_lines
 from workbench.page.desk import SAVED, Desk, name_valve
 from workbench.page.notebook import notebook
-from workbench.page.opening import Export, Opened, map_export, open_file_like, wrong_with
 from workbench.page.provenance import NamedValve
+from workbench.page.recording_opening import Export, Opened, map_export, open_file_like, wrong_with
 from workbench.page.search import Search
 from workbench.page.search_panel import SearchPanel
 

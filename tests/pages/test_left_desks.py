@@ -15,8 +15,8 @@ from tests.cli.test_daemon_process import until
 from tests.pages.laid_out import ends, hidden, never_ends
 from workbench.page.background import Work
 from workbench.page.desk import Desk
-from workbench.page.opening import Opened
 from workbench.page.provenance import NamedValve
+from workbench.page.recording_opening import Opened
 
 if TYPE_CHECKING:
     from workbench.page.page import Workbench

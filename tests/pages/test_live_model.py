@@ -14,7 +14,7 @@ from webpage.units import Units
 from workbench.compare.comparison import compare
 from workbench.data.record import Record, ready
 from workbench.page.live_model import STRONGEST, LiveModel
-from workbench.page.opening import Opened
+from workbench.page.recording_opening import Opened
 from workbench.page.time_figure import LINES, TimeFigure, Window, window_of
 
 

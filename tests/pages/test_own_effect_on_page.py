@@ -15,8 +15,8 @@ from tests.pages.laid_out import hidden
 from workbench.page.background import Finished, News, Progressed, Work
 from workbench.page.command_lines import command_lines
 from workbench.page.desk import Desk
-from workbench.page.opening import Opened
 from workbench.page.provenance import NamedValve
+from workbench.page.recording_opening import Opened
 
 TEXT = EXAMPLE.read_text(encoding="utf-8")
 

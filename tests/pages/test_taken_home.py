@@ -29,8 +29,8 @@ from workbench.page.background import Finished, News
 from workbench.page.command_lines import command_lines
 from workbench.page.desk import Desk, name_valve
 from workbench.page.notebook import notebook
-from workbench.page.opening import Opened
 from workbench.page.provenance import DataSheetMade, NamedValve
+from workbench.page.recording_opening import Opened
 
 TRIED = ("preload", "sensor_offset")
 ACTED, SEQUENCES = 8, 8

@@ -15,7 +15,7 @@ from workbench.imports.column_mapping import RANGE_PA, list_units
 from workbench.imports.export_mapping import ExportMapping
 from workbench.page.desk import Desk
 from workbench.page.export_figure import export_figure
-from workbench.page.opening import OURS, Export, Opened, map_export, split_column, wrong_with
+from workbench.page.recording_opening import OURS, Export, Opened, map_export, split_column, wrong_with
 
 NONE, AS_SAID = "", ""
 WORDS = {

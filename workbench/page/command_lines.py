@@ -6,7 +6,6 @@ from math import inf
 
 from sim.effect import tried_effects
 from workbench.page.desk import Desk
-from workbench.page.opening import Opened
 from workbench.page.provenance import (
     DataSheetMade,
     Extended,
@@ -15,6 +14,7 @@ from workbench.page.provenance import (
     SetByHand,
     blind_folder,
 )
+from workbench.page.recording_opening import Opened
 
 Words = tuple[str, ...]
 

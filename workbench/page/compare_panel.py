@@ -13,7 +13,7 @@ from workbench.compare.comparison import Comparison
 from workbench.compare.comparison_sentences import Stretch
 from workbench.compare.measures import fit_in_words
 from workbench.page.desk import SAVED, Desk
-from workbench.page.explained import word
+from workbench.page.explained_words import word
 from workbench.page.findings_panel import FindingsPanel
 from workbench.page.force_figures import Seen, force_figure
 from workbench.page.live_model import LiveModel

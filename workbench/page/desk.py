@@ -39,7 +39,6 @@ from workbench.page.background import (
     run_extension,
 )
 from workbench.page.live_model import LiveModel
-from workbench.page.opening import Export, Opened
 from workbench.page.provenance import (
     Diagnosed,
     Extended,
@@ -50,6 +49,7 @@ from workbench.page.provenance import (
     refitting,
     steps_on,
 )
+from workbench.page.recording_opening import Export, Opened
 from workbench.page.search import Search
 from workbench.report.units import Quantity, Shown
 

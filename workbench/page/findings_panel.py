@@ -9,7 +9,7 @@ from webpage.page_words import in_page_words
 from webpage.units import Units
 from workbench.compare.comparison import Comparison
 from workbench.compare.comparison_sentences import Stretch, slip_sentences
-from workbench.page.explained import word
+from workbench.page.explained_words import word
 from workbench.report.comparison_report import headline
 from workbench.report.units import of_stroke
 

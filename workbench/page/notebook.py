@@ -9,8 +9,8 @@ from typing import Any
 from config.writing import valve_toml
 from sim.effect import tried_effects
 from workbench.page.desk import Desk
-from workbench.page.opening import Opened
 from workbench.page.provenance import Extended, Hidden, NamedValve
+from workbench.page.recording_opening import Opened
 from workbench.report.comparison_report import headline
 
 KERNEL = {"kernelspec": {"display_name": "Python 3", "language": "python", "name": "python3"}}

@@ -17,8 +17,8 @@ from webpage.number_field import NumberField
 from webpage.theme import Theme
 from workbench.page.columns_panel import ColumnsPanel
 from workbench.page.desk import Desk, name_valve
-from workbench.page.opening import Export, Opened, open_file, open_file_like, wrong_with
 from workbench.page.provenance import DataSheetMade, NamedValve
+from workbench.page.recording_opening import Export, Opened, open_file, open_file_like, wrong_with
 
 SUFFIXES = (".csv", ".txt", ".parquet", ".xlsx", ".mat")
 """Of files that a folder offers."""

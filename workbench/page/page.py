@@ -13,7 +13,7 @@ from workbench.page.compare_panel import ComparePanel
 from workbench.page.desk import Desk, name_valve
 from workbench.page.journal_panel import JournalPanel
 from workbench.page.open_panel import OpenPanel, files_of
-from workbench.page.opening import Opened, open_file
+from workbench.page.recording_opening import Opened, open_file
 from workbench.page.search_panel import SearchPanel
 
 TITLE = "positioner workbench"

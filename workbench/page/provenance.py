@@ -19,7 +19,7 @@ from typing import Optional
 from config.data_sheet import DataSheet
 from config.valve_file import ValveFile
 from workbench.diagnosis.extension import Extension
-from workbench.page.opening import Opened
+from workbench.page.recording_opening import Opened
 
 
 @dataclass(frozen=True, slots=True)

@@ -4,8 +4,8 @@ from dataclasses import dataclass, field
 from typing import Any
 
 from workbench.page.background import Failed, Finished, Previewed, Progressed, Raced, Work
-from workbench.page.opening import Opened
 from workbench.page.provenance import Diagnosed, NamedValve
+from workbench.page.recording_opening import Opened
 from workbench.select.tangent_preview import TangentScore
 
 PREVIEWED = 5  # effects in the line of the preview

@@ -16,11 +16,11 @@ from workbench.diagnosis.diagnosis import Diagnosis
 from workbench.discover.discovery import Discovery
 from workbench.page.desk import Desk
 from workbench.page.effect_panel import effect_section
-from workbench.page.explained import ADDING_CELL, EFFECT_CELL, about_effect, word
+from workbench.page.explained_words import ADDING_CELL, EFFECT_CELL, about_effect, word
 from workbench.page.search import Search
 from workbench.report.charts import EXTENDED, MEASURED, axis, layout, mark_line
+from workbench.report.effect_ranking import log_ticks
 from workbench.report.effects_table import headline, ranks
-from workbench.report.ranking import log_ticks
 
 PANEL_LOOK_S = 0.2
 LEAST_BUDGET_S = 1.0

@@ -9,7 +9,7 @@ The same input, the same bytes. Its files:
 
     comparison_report, diagnosis_report    the sections of each report
     forces_report, journal_report          of the others
-    effects_table, ranking                 sections that two of them share; which effect lowers the error how far
+    effects_table, effect_ranking          sections that two of them share; which effect lowers the error how far
     overlay, signature_loop                measured and simulated, over time and over the command
     charts, plot_series                    the small plots; what is too long thinned out
     page, units                            pieces of HTML set into one page; units that people at a plant use

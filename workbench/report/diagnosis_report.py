@@ -13,7 +13,7 @@ from workbench.data.held_out import Split
 from workbench.diagnosis.diagnosis import Diagnosis
 from workbench.fit.fitted_parameter import Fitted
 from workbench.model.sampling import MORE_LANDINGS
-from workbench.report import page, ranking
+from workbench.report import effect_ranking, page
 from workbench.report.charts import EXTENDED, MODEL, QUIET, axis, layout, line
 from workbench.report.comparison_report import MEANINGS, WORDS, facts, overlaid, recording
 from workbench.report.effects_table import RankedStep, headline, not_told_apart, ranks, show_added, show_tried
@@ -143,7 +143,7 @@ def _fall(diagnosis: Diagnosis, validation: _Validation) -> page.Html:
     ]
     errors = [(name, model.errors.train_rmse_m, model.errors.test_rmse_m) for name, model, _ in stages]
     read = Reading(diagnosis.kind)
-    figure = ranking.error_reduction(errors, validation.floor_m, read.errors)
+    figure = effect_ranking.error_reduction(errors, validation.floor_m, read.errors)
     rows = [
         page.Row(
             [

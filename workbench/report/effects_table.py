@@ -4,9 +4,9 @@ from collections.abc import Collection, Mapping, Sequence
 from dataclasses import dataclass
 
 from sim.effect import Effect, find_effect
-from workbench.report import ranking
+from workbench.report import effect_ranking
+from workbench.report.effect_ranking import RankedEffect
 from workbench.report.page import Html, Row, keep_lines, plot, section, subheading, table, text
-from workbench.report.ranking import RankedEffect
 from workbench.report.units import Quantity
 from workbench.select.effect_acceptance import LEAST_BIC, LEAST_HELD_OUT
 from workbench.select.equivalence import classes, distinguishing_record
@@ -72,7 +72,7 @@ def show_tried(steps: Sequence[RankedStep], floor: float | None, of: Quantity) -
             subheading(f"Step {number}: beside {', '.join(race.beside)}" if race.beside else f"Step {number}"),
             plot(
                 f"plot-ranking-{number}",
-                ranking.ranking(rows, race.before, floor, of),
+                effect_ranking.ranking(rows, race.before, floor, of),
                 110 + 26 * len(rows),
                 f"Held-out error, rms, with each effect added; {dashed}dotted the error without any of them. "
                 "The scale is logarithmic.",

@@ -10,7 +10,7 @@ from workbench.compare.residuals import BINS, FEWEST_BIN_ROWS, Profile, profile
 from workbench.data.imposed_motion import Rows
 from workbench.forces.force_balance import ForceFit, balanced_n, carried_n
 from workbench.forces.force_diagnosis import BALANCE_FLOORS, ForceDiagnosis
-from workbench.report import page, ranking
+from workbench.report import effect_ranking, page
 from workbench.report.charts import EXTENDED, MEASURED, MODEL, QUIET, Figure, axis, layout, line, profiles
 from workbench.report.comparison_report import WORDS
 from workbench.report.diagnosis_report import DIAGNOSIS_WORDS
@@ -119,7 +119,7 @@ def _fall(diagnosis: ForceDiagnosis) -> page.Html:
         "How the error fell",
         page.plot(
             "plot-fall",
-            ranking.error_reduction(errors, None, FORCE),
+            effect_ranking.error_reduction(errors, None, FORCE),
             300,
             "Error of the balance, rms. Each held-out part is predicted by a fit that has not seen it.",
         ),

@@ -5,7 +5,7 @@ from pathlib import Path
 
 from config.drive import Kind
 from workbench.diagnosis.extension_journal import ExtensionStep, Journal
-from workbench.report import page, ranking
+from workbench.report import effect_ranking, page
 from workbench.report.units import Reading, Shown, times
 
 WORDS = {
@@ -61,7 +61,7 @@ def journal_sections(steps: Sequence[ExtensionStep], read: Reading) -> tuple[pag
             "How the error fell",
             page.plot(
                 "plot-journal",
-                ranking.error_reduction(stages, floor_m, read.errors),
+                effect_ranking.error_reduction(stages, floor_m, read.errors),
                 320,
                 f"Error, rms, at each step. Dashed: the floor of the last, {read.said(floor_m)}.",
             ),

@@ -17,7 +17,7 @@ A command imports from here what it needs when it runs.
     config_argument                             which file a command is about
     output_files                                what `--out` and `--json` ask for
     sampling                                    when a device samples, for `doctor --nudge-pa`
-    authority, progress, passing_line           a test certificate authority; progress on a terminal, in one line there
+    trial_authority, progress, passing_line     a test certificate authority; progress on a terminal, in one line there
     clone_only                                  what a command finds in a clone of the project alone
     breaking_off                                Ctrl-C during long work: what is known is said
 """

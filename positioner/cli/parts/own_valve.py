@@ -42,9 +42,9 @@ def own_valve(file: "DaemonFile", source: Path) -> "Iterator[OwnCycle]":
     from positioner.control.controller import Controller
     from positioner.control.settings import Settings
     from positioner.daemon.cycle import Cycle
-    from positioner.daemon.kept_alone import keep_alone
     from positioner.daemon.link import Link, LinkSettings
     from positioner.daemon.pacing import DevicePace, RealTimePace
+    from positioner.daemon.sole_daemon import keep_alone
     from positioner.tests_on_the_valve.own_cycle import OwnCycle
 
     require_no_daemon(file)

@@ -26,9 +26,9 @@ from positioner.daemon.health.health_file import (
 from positioner.daemon.health.ne107 import Ne107Condition, ne107_condition
 from positioner.daemon.health.valve_health import Health
 from positioner.daemon.keeping_thread import WRITE_EVERY_CHECKS
-from positioner.daemon.kept_alone import HEALTH, valve_file_path
 from positioner.daemon.logs import log_event, logging_valve
 from positioner.daemon.snapshot import Snapshot
+from positioner.daemon.sole_daemon import HEALTH, valve_file_path
 
 log = logging.getLogger(__name__)
 

@@ -5,7 +5,7 @@ is still true, the control core finds out (`positioner.control.restoration`).
 
     memory_file                   the file: version, checksum, written whole; what cannot be used is set aside
     knowledge_record              what is known as JSON, and back, checked
-    conditions                    for which configuration it holds, and which key has changed
+    known_configuration           for which configuration it holds, and which key has changed
     memory_keeper                 when it is written
 """
 

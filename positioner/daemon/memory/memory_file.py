@@ -17,8 +17,8 @@ from typing import Any
 
 from config.whole_file import replace_whole
 from positioner.control.valve_knowledge import ValveKnowledge
-from positioner.daemon.memory.conditions import Conditions, changed
 from positioner.daemon.memory.knowledge_record import knowledge_in, record_of
+from positioner.daemon.memory.known_configuration import Conditions, changed
 
 VERSION = 3
 SET_ASIDE = ".set_aside"

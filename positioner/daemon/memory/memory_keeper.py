@@ -15,10 +15,10 @@ from config.errors import explain_failure
 from positioner.control.controller_memory import Decision
 from positioner.control.valve_knowledge import ValveKnowledge
 from positioner.daemon.keeping_thread import WRITE_EVERY_CHECKS
-from positioner.daemon.kept_alone import MEMORY, valve_file_path
 from positioner.daemon.logs import log_event, logging_valve
-from positioner.daemon.memory.conditions import Conditions
+from positioner.daemon.memory.known_configuration import Conditions
 from positioner.daemon.memory.memory_file import Kept, read_memory, set_aside, write_memory
+from positioner.daemon.sole_daemon import MEMORY, valve_file_path
 
 log = logging.getLogger(__name__)
 

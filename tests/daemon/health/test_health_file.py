@@ -16,8 +16,8 @@ from positioner.daemon.health import Health, HealthKeeper, HealthRecord, StoredH
 from positioner.daemon.health.daily_figures import DAY_S, OperationDay
 from positioner.daemon.health.health_file import KeptAlarm, KeptHealth, KeptMore, kept_days, read_record, write_record
 from positioner.daemon.health.valve_conditions import KeptConditions
-from positioner.daemon.kept_alone import HEALTH, valve_file_path
 from positioner.daemon.snapshot import Snapshot
+from positioner.daemon.sole_daemon import HEALTH, valve_file_path
 from tests.daemon.health.test_valve_health import Panel
 
 KEPT = HealthRecord(12.5, 340, 0.25, 17, 22e3)

@@ -15,7 +15,7 @@ from config.supervision_table import SupervisionTable
 from config.travel import Travel
 from config.valve_file import load_valve, shipped_valve
 from fieldbus.modbus.register_answers import RegisterError
-from northbound.observer.words import ne107_causes
+from northbound.observer.register_words import ne107_causes
 from positioner.control.controller_memory import Decision
 from positioner.control.requests import Requests
 from positioner.control.sample import Sample

@@ -3,7 +3,7 @@
 from typing import Any
 
 from config.daemon_file import DaemonFile
-from positioner.daemon.memory.conditions import pressure_scales
+from positioner.daemon.memory.known_configuration import pressure_scales
 
 
 def file(command: dict[str, Any], **device: Any) -> DaemonFile:

@@ -12,7 +12,7 @@ import pytest
 
 from config.daemon_file import DaemonFile
 from positioner.control.valve_knowledge import ValveKnowledge
-from positioner.daemon.memory.conditions import conditions_of
+from positioner.daemon.memory.known_configuration import conditions_of
 from positioner.daemon.memory.memory_file import SET_ASIDE, read_memory, write_memory
 from positioner.estimation.acceptance import Ratios
 from positioner.estimation.estimates import Directions

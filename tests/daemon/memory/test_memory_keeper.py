@@ -16,7 +16,7 @@ from positioner.control.restoration import Restoration
 from positioner.control.valve_knowledge import ValveKnowledge
 from positioner.daemon.keeping_thread import WRITE_EVERY_CHECKS
 from positioner.daemon.memory import MemoryKeeper, StoredMemory
-from positioner.daemon.memory.conditions import conditions_of
+from positioner.daemon.memory.known_configuration import conditions_of
 from positioner.daemon.memory.memory_file import SET_ASIDE
 from positioner.estimation.acceptance import Applied, Ratios
 

@@ -3,7 +3,7 @@
 from nicegui import ui
 
 from config.codes import Ne107Status
-from northbound.operator_page.facts import NE107_LETTER
+from northbound.operator_page.valve_facts import NE107_LETTER
 
 NE107_COLOURS = {
     Ne107Status.GOOD: "#1b7f79",

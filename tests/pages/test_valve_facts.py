@@ -19,11 +19,11 @@ from config.registers import BY_NAME
 from config.role_passwords import read_passwords, set_password
 from config.roles import Role
 from northbound.observer.freshness import Freshness
-from northbound.observer.happened import Happened
 from northbound.observer.trends import thin_columns
+from northbound.observer.valve_events import Happened
 from northbound.observer.valve_view import ValvePicture
 from northbound.observer.waiting_reference import Writer
-from northbound.operator_page import facts
+from northbound.operator_page import valve_facts
 from northbound.operator_page.moves_ahead import BY_LAW, NOBODY_KNOWS, UNKNOWN_FILE, Ahead
 from webpage.units import LENGTHS, Units
 
@@ -45,7 +45,7 @@ def with_values(**values: float) -> ValvePicture:
 
 def test_figures_are_in_the_units_chosen() -> None:
     units = Units()
-    assert facts.figures(PICTURE, STROKE_M, units) == {
+    assert valve_facts.figures(PICTURE, STROKE_M, units) == {
         "reference": "50.00 %",
         "position": "50.00 %",
         "pressure": "0.441 bar",
@@ -53,12 +53,12 @@ def test_figures_are_in_the_units_chosen() -> None:
     }
     units.position = "in"
     units.choose_pressure("psi")
-    told = facts.figures(PICTURE, STROKE_M, units)
+    told = valve_facts.figures(PICTURE, STROKE_M, units)
     assert (told["position"], told["pressure"]) == ("1.969 in", "6.40 psi")
 
 
 def test_nothing_is_not_below_nothing() -> None:
-    told = facts.figures(with_values(position_m=-3e-6, pressure=-20.0, command=-60.0), STROKE_M, Units())
+    told = valve_facts.figures(with_values(position_m=-3e-6, pressure=-20.0, command=-60.0), STROKE_M, Units())
     assert (told["position"], told["pressure"], told["command"]) == ("0.00 %", "0.000 bar", "-0.001 bar")
 
 
@@ -67,7 +67,7 @@ def test_when_something_has_happened_is_told_with_its_zone(monkeypatch: pytest.M
     monkeypatch.setenv("TZ", "XYZ-3")
     time.tzset()
     try:
-        (line,) = facts.list_events([Happened(0.0, "the daemon started")])
+        (line,) = valve_facts.list_events([Happened(0.0, "the daemon started")])
     finally:
         monkeypatch.undo()
         time.tzset()
@@ -80,35 +80,35 @@ def test_of_a_valve_whose_stroke_nobody_said_positions_are_lengths() -> None:
 
 def test_an_old_measurement_is_no_figure_while_what_is_commanded_is() -> None:
     old = replace(PICTURE, freshness=Freshness(measurement="the last good measurement is 3.0 s old"))
-    told = facts.figures(old, STROKE_M, Units())
+    told = valve_facts.figures(old, STROKE_M, Units())
     assert (told["position"], told["pressure"], told["reference"]) == ("– %", "– bar", "50.00 %")
-    assert "the last good measurement is 3.0 s old" in [each.text for each in facts.status(old)]
+    assert "the last good measurement is 3.0 s old" in [each.text for each in valve_facts.status(old)]
 
 
 def test_ne107_has_a_letter_its_words_and_the_deciding_cause_first() -> None:
     causes = (Ne107Cause.NOT_AUTOMATIC, Ne107Cause.FRICTION_HIGH)
     bits = sum(1 << (cause - 1) for cause in causes)
     seen = with_values(ne107=Ne107Status.MAINTENANCE_REQUIRED, ne107_cause=Ne107Cause.FRICTION_HIGH, ne107_causes=bits)
-    assert facts.condition(seen) == (
+    assert valve_facts.condition(seen) == (
         "M",
         "M maintenance",
         ["friction high: packing tight", "not automatic"],
     )
-    assert facts.condition(PICTURE) == ("", "good", [])
-    assert facts.condition(replace(PICTURE, values={}))[:2] == ("?", "unknown")
+    assert valve_facts.condition(PICTURE) == ("", "good", [])
+    assert valve_facts.condition(replace(PICTURE, values={}))[:2] == ("?", "unknown")
 
 
 def test_a_fault_that_is_not_known_counts_as_one() -> None:
-    assert not facts.is_faulty(PICTURE)
-    assert facts.is_faulty(with_values(fault=Fault.STALE))
-    assert facts.is_faulty(replace(PICTURE, values={}))
+    assert not valve_facts.is_faulty(PICTURE)
+    assert valve_facts.is_faulty(with_values(fault=Fault.STALE))
+    assert valve_facts.is_faulty(replace(PICTURE, values={}))
 
 
 def test_nothing_is_left_out_where_nothing_is_known() -> None:
     known, unknown = PICTURE, replace(PICTURE, values={})
-    for said in (facts.status, facts.cycle, lambda picture: facts.wear(picture, Units())):
+    for said in (valve_facts.status, valve_facts.cycle, lambda picture: valve_facts.wear(picture, Units())):
         assert [each.label for each in said(known)] == [each.label for each in said(unknown)]
-    assert "–" in facts.wear(unknown, Units())[0].text
+    assert "–" in valve_facts.wear(unknown, Units())[0].text
 
 
 def test_estimates_begin_with_pressures_and_end_with_what_is_refused_each_reason_once() -> None:
@@ -117,7 +117,7 @@ def test_estimates_begin_with_pressures_and_end_with_what_is_refused_each_reason
         b_over_c_e=-814542.6, b_over_c_std=1000.0, b_over_c_valid=1.0,
         b_reason=11.0, c_reason=11.0, k_reason=3.0,
     )  # fmt: skip
-    told = facts.estimates(seen, STROKE_M, Units())
+    told = valve_facts.estimates(seen, STROKE_M, Units())
     assert [(each.label, each.text) for each in told[:2]] == [
         ("b_over_c", "-0.8145 ± 0.002 bar over the stroke"),
         ("a", "-100 ± 2 1/s"),
@@ -179,9 +179,9 @@ def test_before_manual_it_is_said_where_the_pressure_takes_the_stem() -> None:
 
 def test_a_reference_that_waits_is_shown_and_one_that_is_followed_is_not() -> None:
     waiting = ahead().picture
-    assert facts.waiting(waiting, STROKE_M, Units()) == "waits: 70.00 %, followed in automatic"
+    assert valve_facts.waiting(waiting, STROKE_M, Units()) == "waits: 70.00 %, followed in automatic"
     followed = replace(waiting, values={**waiting.values, "mode": Mode.AUTOMATIC})
-    assert facts.waiting(followed, STROKE_M, Units()) == ""
+    assert valve_facts.waiting(followed, STROKE_M, Units()) == ""
 
 
 def test_a_window_keeps_its_extremes_and_its_gaps() -> None:

@@ -7,10 +7,16 @@ from dataclasses import dataclass
 
 from config.codes import Fault, Ne107Status
 from config.registers import BY_NAME
-from northbound.observer.happened import Happened
+from northbound.observer.register_words import (
+    EstimateInWords,
+    device_status,
+    estimates_in_words,
+    in_words,
+    ne107_causes,
+)
+from northbound.observer.valve_events import Happened
 from northbound.observer.valve_view import ValvePicture
 from northbound.observer.waiting_reference import waiting_reference
-from northbound.observer.words import EstimateInWords, device_status, estimates_in_words, in_words, ne107_causes
 from webpage.units import NO_NUMBER, Unit, Units
 
 

@@ -3,7 +3,14 @@
 from pathlib import Path
 
 from config.codes import EventKind, Fault, Mode, Ne107Status
-from northbound.observer.happened import AS_SERVED, FROM_HISTORY, SeenEvent, _put_in_words, read_event, what_happened
+from northbound.observer.valve_events import (
+    AS_SERVED,
+    FROM_HISTORY,
+    SeenEvent,
+    _put_in_words,
+    read_event,
+    what_happened,
+)
 from northbound.observer.valve_view import ValveView
 from positioner.history import HistoryFile
 from positioner.history.entries import Event

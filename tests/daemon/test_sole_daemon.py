@@ -7,7 +7,7 @@ import pytest
 
 from config.daemon_file import DaemonFile
 from config.errors import InputError
-from positioner.daemon.kept_alone import keep_alone
+from positioner.daemon.sole_daemon import keep_alone
 
 
 def file(name: str, **folders: str) -> DaemonFile:

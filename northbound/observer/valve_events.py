@@ -13,7 +13,7 @@ from pathlib import Path
 
 from config.codes import EventKind, Ne107Status, cause_text
 from config.errors import InputError
-from northbound.observer.words import code_text
+from northbound.observer.register_words import code_text
 from positioner.history import HistoryReader
 from positioner.history.entries import Event
 
