@@ -113,8 +113,8 @@ def _commissioned(valve: Watching, name: str, bounds: Bounds, show: Callable[[st
     if lacking := supply_lacking(recordings):  # a stem that waits for air looks as one on its stop
         raise _Ended(ValveTestVerdict.NO_SUPPLY, lacking)
     found = signature.signature(recordings, signature.Nameplate(name, 1.0))
-    if ValveTestVerdict.NO_SPRING in found.verdicts:
-        raise _Ended(ValveTestVerdict.NO_SPRING, found.notes[-1])
+    if not found.quantities or ValveTestVerdict.NO_SPRING in found.verdicts:
+        raise _Ended(found.verdicts[0], found.notes[-1])
     travel, low, high = (found.figure(each) for each in ("travel_m", "low_m", "high_m"))
     if travel.value is None or low.value is None or high.value is None:
         limit = (

@@ -1,20 +1,22 @@
 """No test leaves its window by more than its declared margin, whatever happens; and where the valve is after it.
 
-Faults of the device, of the DCS and of whoever tests are drawn, at any moment of a partial stroke, a continuous stroke
-or small steps; so is what `[safety]` does on a fault.
+Faults of the device, of the DCS and of whoever tests are drawn, at any moment of any test; so is what `[safety]` does
+on a fault. Signature and commissioning go over the whole travel: they are broken off by a window inside it, too, and
+their commands go no faster than they may.
 """
 
-from collections.abc import Callable
+from collections.abc import Sequence
 from dataclasses import dataclass, replace
 
 import numpy as np
 import pytest
 
-from config.codes import ExperimentState, Fault, Mode
+from config.codes import ExperimentState, Fault, Mode, ValveTestVerdict
 from config.slave_file import DeviceFault, Initial
 from positioner.control.settings import Settings
-from positioner.tests_on_the_valve import continuous_stroke, partial_stroke, small_steps
-from positioner.tests_on_the_valve.program import Program
+from positioner.tests_on_the_valve import continuous_stroke, partial_stroke, signature, small_steps
+from positioner.tests_on_the_valve.commissioning import commission
+from positioner.tests_on_the_valve.program import Played, Program
 from tests.tests_on_the_valve.virtual_valve import (
     AREA_M2,
     MAXIMUM_PA,
@@ -38,6 +40,11 @@ ENDS_AT_PA = {"hold": None, "vent": 0.0, "fill": MAXIMUM_PA}
 """What is commanded after a fault, by `[safety] action`; None: what was commanded before it."""
 TESTS = ("partial", "fast", "continuous", "steps", "narrow")
 """Narrow: steps that go farther than their band, and are broken off by it."""
+WHOLE = ("signature", "windowed", "commissioning")
+"""Tests over the whole travel; windowed: a signature in a window inside it."""
+WINDOW = (0.1, 0.9)
+LIMIT_S = 100.0
+"""Of a program of those over the whole travel: ramps as fast as they may be."""
 PEOPLE = ("veto", "no consent", "hold", "nothing", "twice")
 
 
@@ -52,11 +59,20 @@ class Drawn:
     action: str
 
     @classmethod
-    def by(cls, seed: int) -> "Drawn":
+    def by(cls, seed: int, tests: Sequence[str], within_s: float) -> "Drawn":
         draw = np.random.default_rng(seed)
         what = str(draw.choice(DEVICE + PEOPLE))
-        at_s, opening = float(draw.uniform(0.2, 16.0)), float(draw.uniform(0.15, 0.85))
-        return cls(what, at_s, opening, str(draw.choice(TESTS)), str(draw.choice(list(ENDS_AT_PA))))
+        at_s, opening = float(draw.uniform(0.2, within_s)), float(draw.uniform(0.15, 0.85))
+        return cls(what, at_s, opening, str(draw.choice(tests)), str(draw.choice(list(ENDS_AT_PA))))
+
+    @property
+    def window(self) -> tuple[float, float]:
+        return WINDOW if self.test == "windowed" else (0.0, 1.0)
+
+    @property
+    def rate_pa_per_s(self) -> float:
+        """Of the command, at the most."""
+        return RATE_PA_PER_S if self.test in ("fast", "steps", "narrow", *WHOLE) else MAXIMUM_PA / 60.0
 
     @property
     def faults(self) -> tuple[DeviceFault, ...]:
@@ -66,20 +82,68 @@ class Drawn:
         return (DeviceFault(kind=self.what, at_s=self.at_s, **own.get(self.what, {})),)  # type: ignore[arg-type]
 
 
-def asked_of(valve: VirtualValve, drawn: Drawn) -> tuple[Program, float]:
-    """Return the program, and the band that it declares, m."""
+def programs_of(valve: VirtualValve, drawn: Drawn) -> tuple[Program, ...]:
+    """Return the programs of a test."""
     bounds, start_pa = Settings.of(valve.file).experiment, valve.command_pa()
+    if drawn.test in ("signature", "windowed"):
+        return signature.programmes(bounds, start_pa)
     if drawn.test == "continuous":
         way = 1 if drawn.opening < 0.5 else -1
         asked = continuous_stroke.ContinuousStroke(rate=5e-3)
-        program = continuous_stroke.programme(asked, bounds, start_pa, STROKE_M, way)
-    elif drawn.test in ("steps", "narrow"):
+        return (continuous_stroke.programme(asked, bounds, start_pa, STROKE_M, way),)
+    if drawn.test in ("steps", "narrow"):
         steps = small_steps.SmallSteps(840.0 / AREA_M2, 0.4, most=0.02 if drawn.test == "narrow" else 0.3)
-        program = small_steps.programme(steps, bounds, start_pa, STROKE_M)
-    else:
-        wanted = partial_stroke.PartialStroke(fast=drawn.test == "fast")
-        program = partial_stroke.programme(wanted, bounds, start_pa, valve.device.stem_m, STROKE_M)
-    return program, program.band_m
+        return (small_steps.programme(steps, bounds, start_pa, STROKE_M),)
+    wanted = partial_stroke.PartialStroke(fast=drawn.test == "fast")
+    return (partial_stroke.programme(wanted, bounds, start_pa, valve.device.stem_m, STROKE_M),)
+
+
+class Watched(VirtualValve):
+    """A valve to which something happens; what became of the last program, and how far the stem went."""
+
+    played: Played
+
+    def __init__(self, drawn: Drawn, seed: int) -> None:
+        experiment = {"rate_limit_pa_per_s": RATE_PA_PER_S, "travel_window": drawn.window}
+        if drawn.test in WHOLE:
+            experiment |= {"limit_s": LIMIT_S}
+        stem_m = drawn.opening * STROKE_M
+        super().__init__(
+            TIGHT,
+            daemon_file(experiment=experiment, safety={"action": drawn.action}),
+            initial=Initial(position_m=stem_m, pressure_pa=20e3 + SLOPE * stem_m),
+            faults=drawn.faults,
+            noise=1e-4,
+            seed=seed,
+        )
+        self.drawn, self._to_come = drawn, drawn.what in PEOPLE
+        self.lowest_m = self.highest_m = self.begun_m = self.device.stem_m
+        self.fastest_pa_per_s = 0.0
+        self.turn = self._turn
+
+    def test(self) -> None:
+        """Have the test done, as its command does it."""
+        if self.drawn.test == "commissioning":
+            commission(self, "FV-1", Settings.of(self.file).experiment)
+            return
+        for program in programs_of(self, self.drawn):
+            if not self.play(program).state.played:
+                return
+
+    def play(self, program: Program) -> Played:
+        self.band_m = program.band_m
+        self.played = super().play(program)
+        return self.played
+
+    def _turn(self) -> None:
+        if self._to_come and self.cycle.snapshot.sample.now_s >= self.drawn.at_s:
+            people(self, self.drawn)
+            self._to_come = False
+        before_pa = self.command_pa()
+        self.cycle.once()
+        if self.cycle.snapshot.decision.experiment.commands:
+            self.fastest_pa_per_s = max(self.fastest_pa_per_s, abs(self.command_pa() - before_pa) / PERIOD_S)
+        self.lowest_m, self.highest_m = min(self.lowest_m, self.device.stem_m), max(self.highest_m, self.device.stem_m)
 
 
 def people(valve: VirtualValve, drawn: Drawn) -> None:
@@ -97,34 +161,23 @@ def people(valve: VirtualValve, drawn: Drawn) -> None:
     valve.cycle.requests = requests
 
 
-def run(seed: int) -> None:
-    drawn = Drawn.by(seed)
-    file = daemon_file(experiment={"rate_limit_pa_per_s": RATE_PA_PER_S}, safety={"action": drawn.action})
-    stem_m = drawn.opening * STROKE_M
-    initial = Initial(position_m=stem_m, pressure_pa=20e3 + SLOPE * stem_m)
-    valve = VirtualValve(TIGHT, file, initial=initial, faults=drawn.faults, noise=1e-4, seed=seed)
-    program, band_m = asked_of(valve, drawn)
-    held_pa, begun_m = valve.command_pa(), valve.device.stem_m
-    farthest_m = 0.0
-    turn: Callable[[], None] = valve.turn
-    happened = drawn.what in DEVICE
-
-    def watched() -> None:
-        nonlocal farthest_m, happened
-        if not happened and valve.cycle.snapshot.sample.now_s >= drawn.at_s:
-            people(valve, drawn)
-            happened = True
-        turn()
-        farthest_m = max(farthest_m, abs(valve.device.stem_m - begun_m))
-
-    valve.turn = watched
-    played = valve.play(program)
-    speed = (RATE_PA_PER_S if drawn.test in ("fast", "steps", "narrow") else 140e3 / 60.0) / SLOPE
+def run(seed: int, tests: Sequence[str] = TESTS, within_s: float = 16.0) -> None:
+    drawn = Drawn.by(seed, tests, within_s)
+    valve = Watched(drawn, seed)
+    held_pa = valve.command_pa()
+    valve.test()
+    played = valve.played
     lied_m = JUMP_M if drawn.what in ("jump", "drift") else 0.0
     if drawn.what == "supply":  # the air is gone: the spring closes it, whatever is commanded
-        lied_m = begun_m
-    margin_m = SLIP_M + COUNTED_S * speed + 6.0 * 1e-4 * STROKE_M
-    assert farthest_m <= band_m + margin_m + lied_m, (seed, drawn, played.state.name)
+        lied_m = valve.begun_m
+    margin_m = SLIP_M + COUNTED_S * drawn.rate_pa_per_s / SLOPE + 6.0 * 1e-4 * STROKE_M
+    low_m, high_m = (each * STROKE_M for each in drawn.window)
+    if valve.band_m:
+        low_m, high_m = valve.begun_m - valve.band_m, valve.begun_m + valve.band_m
+    assert low_m - margin_m - lied_m <= valve.lowest_m, (seed, drawn, played.state.name)
+    assert valve.highest_m <= high_m + margin_m + lied_m, (seed, drawn, played.state.name)
+    if drawn.test in WHOLE:
+        assert valve.fastest_pa_per_s <= 1.01 * RATE_PA_PER_S, (seed, drawn)
     decision = valve.cycle.snapshot.decision
     assert not decision.experiment.commands
     after_pa = valve.command_pa()
@@ -138,7 +191,7 @@ def run(seed: int) -> None:
     else:
         assert after_pa == held_pa, (seed, drawn, played.state.name)
         if drawn.what == "twice":
-            assert played.state.played or played.state is ExperimentState.BEYOND_BAND
+            assert played.state.played or played.broken_off == [ValveTestVerdict.TRAVEL_EXCEEDED]
     valve.watch(1.0)
     if valve.cycle.snapshot.decision.fault is decision.fault:  # none has come after the test
         assert valve.command_pa() == after_pa, "it stays where it is"
@@ -153,7 +206,18 @@ def test_whatever_happens_the_stem_stays_within_its_band_and_the_command_comes_b
     run(seed)
 
 
+@pytest.mark.parametrize("seed", range(4))
+def test_so_it_does_in_tests_over_the_whole_travel(seed: int) -> None:
+    run(seed, WHOLE, 60.0)
+
+
 @pytest.mark.long
 def test_the_same_of_two_hundred() -> None:
     for seed in range(12, 212):
         run(seed)
+
+
+@pytest.mark.long
+def test_the_same_of_two_hundred_over_the_whole_travel() -> None:
+    for seed in range(4, 204):
+        run(seed, WHOLE, 120.0)
