@@ -173,12 +173,12 @@ class SpoiltNode(NodeServer):
         self._spoiler = spoiler
         super().__init__(bus, device, clock, "campaign")
 
-    def _send(self, identity: int, data: bytes) -> None:
+    def send(self, identity: int, data: bytes) -> None:
         if 0x180 < identity < 0x200:
             for each in self._spoiler.replies(data):
-                super()._send(identity, each)
+                super().send(identity, each)
         elif not (self._spoiler.kind == "lose" and identity < 0x580 and self._spoiler.takes_request()):
-            super()._send(identity, data)
+            super().send(identity, data)
 
 
 def _canopen(device: Device, clock: Clock, spoiler: Spoiler, stack: ExitStack) -> tuple[DeviceTable, Side]:

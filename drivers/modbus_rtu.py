@@ -38,18 +38,18 @@ class ModbusRtuDriver(ModbusDriver):
         super().__init__(config, f"{config.serial.path} unit {config.unit}")
         self._unit = config.unit
         self._reply_timeout_s = config.reply_timeout_s
-        self._line = SerialLine(config.serial)
+        self.line = SerialLine(config.serial)
         self._echoes = 0
         self._echoes_back: bool | None = None
         """Whether the device answers function 8; None until it has answered anything."""
 
     def close(self) -> None:
         """Close the line; the device keeps its last command until its own time-out."""
-        self._line.close()
+        self.line.close()
 
     def _connect(self) -> None:
         try:
-            self._line.open()
+            self.line.open()
             self._begin_connection()
             self._await_answers()
         except OSError as error:
@@ -75,9 +75,9 @@ class ModbusRtuDriver(ModbusDriver):
         echo = framed(self._unit, ECHO + self._echoes.to_bytes(2))
         self._await_pause()
         refusal = bytes((self._unit, ECHO[0] | EXCEPTION))
-        until_s = self._line.send(echo, self._reply_timeout_s) + self._reply_timeout_s
+        until_s = self.line.send(echo, self._reply_timeout_s) + self._reply_timeout_s
         heard = b""
-        while data := self._line.receive(until_s):
+        while data := self.line.receive(until_s):
             heard = (heard + data)[-2 * len(echo) :]
             last = heard[-EXCEPTION_FRAME:]
             if heard.endswith(echo) or (last.startswith(refusal) and is_whole(last)):
@@ -102,7 +102,7 @@ class ModbusRtuDriver(ModbusDriver):
         return NoConnection(f"{self._who}: nobody answers within {1e3 * self._reply_timeout_s:g} ms{said}")
 
     def _transact(self, request: bytes, head: bytes, length: int) -> bytes:
-        if not self._line.is_open:
+        if not self.line.is_open:
             raise NoConnection(f"{self._about(request)}: the line is closed")
         try:
             frame = self._answered(framed(self._unit, request), request[0], length + ROUND_FRAME)
@@ -116,9 +116,9 @@ class ModbusRtuDriver(ModbusDriver):
     def _answered(self, frame: bytes, function: int, size: int) -> bytes:
         """Send a request; return what came before its time-out, as far as it can be the reply of that size."""
         self._await_pause()
-        until_s = self._line.send(frame, self._reply_timeout_s) + self._reply_timeout_s
+        until_s = self.line.send(frame, self._reply_timeout_s) + self._reply_timeout_s
         reply = b""
-        while len(reply) < size and (data := self._line.receive(until_s)):
+        while len(reply) < size and (data := self.line.receive(until_s)):
             reply += data
             if len(reply) > 1 and reply[1] != function:
                 size = EXCEPTION_FRAME

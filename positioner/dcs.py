@@ -57,11 +57,11 @@ class Dcs:
 
     def __init__(self, host: str, port: int, unit: int = 1, timeout_s: float = 2.0, tls: Tls | None = None) -> None:
         self._where = f"{host}:{port}"
-        self._client = ModbusClient(host, port, unit, timeout_s, tls)
+        self.client = ModbusClient(host, port, unit, timeout_s, tls)
 
     def __enter__(self) -> Self:
         try:
-            self._client.open()
+            self.client.open()
         except NobodyThere:
             raise DcsError(f"{self._where}: no daemon answers there (is `positioner run` running?)") from None
         except NotConnected as error:
@@ -71,7 +71,7 @@ class Dcs:
     def __exit__(
         self, kind: type[BaseException] | None, error: BaseException | None, trace: TracebackType | None
     ) -> None:
-        self._client.close()
+        self.client.close()
 
     def get(self, name: str) -> float:
         """Return a register's value.
@@ -115,7 +115,7 @@ class Dcs:
             start, *_ = (each.address for each in run.values())
             words = [word for name, each in run.items() for word in each.format.encode(values[name])]
             try:
-                self._client.write_registers(start, words)
+                self.client.write_registers(start, words)
             except ClientError as error:
                 asked = ", ".join(f"{name} = {values[name]:g}" for name in run)
                 why = self._why_refused(values, error) or _in_words(error)
@@ -218,7 +218,7 @@ class Dcs:
             DcsError: the veto did not get there; says why it was wanted.
         """
         try:
-            self._client.open()
+            self.client.open()
             if self.get("experiment_veto"):
                 return
             self.set("experiment_veto", 1)
@@ -243,10 +243,10 @@ class Dcs:
     def _wait_for_a_cycle(self) -> None:
         """Wait until the daemon has decided on what it was told, however slow its loop; not for one that stands."""
         asked, due_s = self.get("cycles"), time.monotonic() + CYCLE_WITHIN_S
-        while not self._decided_since(asked) and time.monotonic() < due_s:
+        while not self.decided_since(asked) and time.monotonic() < due_s:
             time.sleep(POLL_S)
 
-    def _decided_since(self, asked: float) -> bool:
+    def decided_since(self, asked: float) -> bool:
         """Return whether what is served was decided after a count of cycles was read, as the one under way was not."""
         return bool((self.get("cycles") - asked) % CYCLES_WRAP >= 2)
 
@@ -256,7 +256,7 @@ class Dcs:
         begun = False
         asked = self.get("cycles")
         while time.monotonic() < due_s:
-            if not self._decided_since(asked):
+            if not self.decided_since(asked):
                 time.sleep(POLL_S)
                 continue
             now = self.get_all(
@@ -276,7 +276,7 @@ class Dcs:
 
     def _read(self, start: int, end: int) -> list[int]:
         try:
-            return self._client.read_holding_registers(start, end - start)
+            return self.client.read_holding_registers(start, end - start)
         except ClientError as error:
             which = f"registers {start} to {end - 1}"
             raise DcsError(f"{self._where}: {which} cannot be read: {_in_words(error)}") from None

@@ -48,7 +48,7 @@ class CanopenDriver(NodeDriver):
 
     def __init__(self, config: CanopenDevice) -> None:
         super().__init__(config)
-        self._activation = Activation(config.map, self._bus)
+        self._activation = Activation(config.map, self.bus)
         self._said_alive_s = -math.inf
         self._has_driven = False
 
@@ -67,7 +67,7 @@ class CanopenDriver(NodeDriver):
         self.close()
         try:
             own_ids = tuple(first + self._config.node for first in (EMERGENCY, SDO_ANSWER, HEARTBEAT))
-            self._bus.open(own_ids)
+            self.bus.open(own_ids)
             self.sdo.open()
             if self._has_driven:
                 self._watcher.was_interrupted |= self.sdo.hears_stopped()
@@ -76,7 +76,7 @@ class CanopenDriver(NodeDriver):
             held_pa = self._in_force_pa(set_point_pa, status_word)
             wanted = self._configuration.wanted()
             self._say_alive()
-            self._bus.hear((*own_ids, *self.pdos.tpdo_ids))
+            self.bus.hear((*own_ids, *self.pdos.tpdo_ids))
             self.sdo.require_alone()
             as_found = held_pa == set_point_pa or status_word & LOCAL  # a set point is not taken then
             self._set(wanted, None if as_found else held_pa)
@@ -115,7 +115,7 @@ class CanopenDriver(NodeDriver):
         try:
             self.pdos.prepare(command_pa, self._activation.control)
         except ValueError as error:
-            self._bus.require_open()
+            self.bus.require_open()
             raise self._refused(f"not sent: {error}") from None
         self.pdos.catch_up()
         self._say_alive()
@@ -139,10 +139,10 @@ class CanopenDriver(NodeDriver):
 
     def close(self) -> None:
         """Leave the bus; the node keeps its last command until its own time-out. Never raises."""
-        self._bus.close()
+        self.bus.close()
 
     def _manage(self, command: int) -> None:
-        self._bus.send(NMT, bytes((command, self._config.node)))
+        self.bus.send(NMT, bytes((command, self._config.node)))
 
     def _status_word(self) -> int:
         """Return the status word; that of an ACTIVE node where it has none."""
@@ -193,7 +193,7 @@ class CanopenDriver(NodeDriver):
         master, now_s = self._config.master_node, time.monotonic()
         if master is not None and now_s - self._said_alive_s >= self._config.master_heartbeat_s / 2:
             self._said_alive_s = now_s
-            self._bus.send(HEARTBEAT + master, OPERATIONAL)
+            self.bus.send(HEARTBEAT + master, OPERATIONAL)
 
     def _reading(self, values: Mapping[str, float]) -> Reading:
         unfit = 0
@@ -205,4 +205,4 @@ class CanopenDriver(NodeDriver):
         return replace(reading_of(values, unfit), emergency=self._watcher.emergency)
 
     def _refused(self, said: str) -> Refused:
-        return Refused(f"{self._bus.who}: {NodeEvent.COMMAND_REFUSED}: {said}", ILLEGAL_VALUE)
+        return Refused(f"{self.bus.who}: {NodeEvent.COMMAND_REFUSED}: {said}", ILLEGAL_VALUE)

@@ -27,11 +27,11 @@ class NodeDriver:
     def __init__(self, config: CanopenDevice) -> None:
         sheet = device_sheet(config)
         self._config = config
-        self._bus = NodeBus(config)
-        self._watcher = NodeWatcher(config, self._bus)
-        self.sdo = SdoTransfers(config, sheet, self._bus, self._watcher)
-        self.pdos = PdoExchange(config, sheet, self._bus, self._watcher)
-        self._configuration = NodeConfiguration(config, sheet, self._bus, self._watcher, self.sdo, self.pdos)
+        self.bus = NodeBus(config)
+        self._watcher = NodeWatcher(config, self.bus)
+        self.sdo = SdoTransfers(config, sheet, self.bus, self._watcher)
+        self.pdos = PdoExchange(config, sheet, self.bus, self._watcher)
+        self._configuration = NodeConfiguration(config, sheet, self.bus, self._watcher, self.sdo, self.pdos)
 
     @property
     def capabilities(self) -> Capabilities:
@@ -50,7 +50,7 @@ class WatchingDriver(NodeDriver):
         """
         self.close()
         try:
-            self._bus.open((SDO_ANSWER + self._config.node,))
+            self.bus.open((SDO_ANSWER + self._config.node,))
             self.sdo.open()
             return self.sdo.held_command_pa(self._config.map.command_pa)
         except BaseException:
@@ -73,7 +73,7 @@ class WatchingDriver(NodeDriver):
             Refused: always.
         """
         said = f"{command_pa:g} Pa: only_watch is set"
-        raise Refused(f"{self._bus.who}: {NodeEvent.COMMAND_REFUSED}: {said}", ILLEGAL_VALUE)
+        raise Refused(f"{self.bus.who}: {NodeEvent.COMMAND_REFUSED}: {said}", ILLEGAL_VALUE)
 
     def exchange(self, command_pa: float) -> Reading:
         """Command nothing; raises as `write`."""
@@ -90,4 +90,4 @@ class WatchingDriver(NodeDriver):
 
     def close(self) -> None:
         """Leave the bus. Never raises."""
-        self._bus.close()
+        self.bus.close()

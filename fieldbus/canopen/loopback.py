@@ -65,7 +65,7 @@ EXTENDED, REMOTE, ERROR = 1 << 31, 1 << 30, 1 << 29
 ID_BITS = ERROR - 1
 
 
-class _Peer:
+class Peer:
     """Another end: what went to it and came from it."""
 
     __slots__ = ("acked", "address", "deaf", "filters", "port", "received", "sent", "told", "wanted")
@@ -106,17 +106,17 @@ class LoopbackBus(can.BusABC):
     def __init__(self, channel: Any = "29500", can_filters: Any = None, **kwargs: object) -> None:
         self._base = _base(channel)
         self._frames: deque[can.Message] = deque()
-        self._peers: dict[int, _Peer] = {}
+        self.peers: dict[int, Peer] = {}
         self._taking, self._sending = Lock(), RLock()
         self._wakes, self._woken = 0, Event()
         self._looked_s = -math.inf
         self.lost_frames = 0
-        self._socket, self.port = self._bound()
-        self._end = self.port - self._base
+        self.socket, self.port = self._bound()
+        self.end = self.port - self._base
         self.channel_info = f"loopback {self._base}"
         for port in range(self._base, self._base + CHANNEL_ENDS):
             if port != self.port and _taken(port):
-                self._peers[port] = _Peer(port)
+                self.peers[port] = Peer(port)
         super().__init__(channel, can_filters, **kwargs)
 
     def send(self, msg: can.Message, timeout: float | None = None) -> None:  # noqa: ARG002 - it waits `DEAF_S` at most
@@ -136,27 +136,27 @@ class LoopbackBus(can.BusABC):
             if now_s - self._looked_s > BUS_LOOK_S:
                 self._looked_s = now_s
                 self._take_all()
-            for peer in self._peers.values():
+            for peer in self.peers.values():
                 if peer.deaf or not (msg.is_error_frame or peer.wants(identity)):
                     continue
                 if peer.sent - peer.acked >= WINDOW and not self._has_room(peer):
                     continue
                 peer.sent += 1
                 peer.told = peer.received
-                self._put(peer, FRAME.pack(MAGIC, DATA, self._end, peer.sent, peer.received, flagged) + data)
+                self._put(peer, FRAME.pack(MAGIC, DATA, self.end, peer.sent, peer.received, flagged) + data)
 
     def fileno(self) -> int:
         """Return the socket, readable when something came."""
-        return self._socket.fileno()
+        return self.socket.fileno()
 
     def shutdown(self) -> None:
         """Leave the bus."""
         if not self._is_shutdown:
-            for peer in self._peers.values():
+            for peer in self.peers.values():
                 with suppress(can.CanOperationError):
                     self._tell(peer, BYE)
         super().shutdown()
-        self._socket.close()
+        self.socket.close()
 
     def recv(self, timeout: float | None = None) -> can.Message | None:
         """Return the next frame, None after the time-out: as python-can's own, without its detours.
@@ -189,7 +189,7 @@ class LoopbackBus(can.BusABC):
         pairs = [FILTER.pack(each["can_id"], each["can_mask"]) for each in filters or ()]
         wanted = b"".join(pairs) if len(pairs) <= CHANNEL_ENDS else b""
         with self._sending:
-            for peer in self._peers.values():
+            for peer in self.peers.values():
                 self._tell(peer, HELLO, wanted)
 
     def _bound(self) -> tuple[socket.socket, int]:
@@ -208,13 +208,13 @@ class LoopbackBus(can.BusABC):
         end.close()
         raise can.CanInitializationError(f"loopback {self._base}: all of its {CHANNEL_ENDS} ends are taken")
 
-    def _tell(self, peer: _Peer, kind: int, body: bytes = b"") -> None:
+    def _tell(self, peer: Peer, kind: int, body: bytes = b"") -> None:
         peer.told = peer.received
-        self._put(peer, HEAD.pack(MAGIC, kind, self._end, peer.sent, peer.received) + body)
+        self._put(peer, HEAD.pack(MAGIC, kind, self.end, peer.sent, peer.received) + body)
 
-    def _put(self, peer: _Peer, datagram: bytes) -> None:
+    def _put(self, peer: Peer, datagram: bytes) -> None:
         try:
-            self._socket.sendto(datagram, peer.address)
+            self.socket.sendto(datagram, peer.address)
         except OSError as error:
             raise can.CanOperationError(f"{self.channel_info}: {error.strerror}") from None
 
@@ -224,7 +224,7 @@ class LoopbackBus(can.BusABC):
         self._woken.clear()
         while not self._taking.acquire(blocking=False):
             with suppress(OSError):  # closed meanwhile: the reader ends, and lets go
-                self._socket.sendto(HEAD.pack(MAGIC, WAKE, self._end, self._wakes, 0), (HOST, self.port))
+                self.socket.sendto(HEAD.pack(MAGIC, WAKE, self.end, self._wakes, 0), (HOST, self.port))
             if self._woken.wait(WAIT_IN_KERNEL_S):
                 return
         try:
@@ -241,7 +241,7 @@ class LoopbackBus(can.BusABC):
             if wait_s:
                 self._await(wait_s)
         try:
-            datagram, sender = self._socket.recvfrom(LONGEST + 1, flags)
+            datagram, sender = self.socket.recvfrom(LONGEST + 1, flags)
         except BlockingIOError:
             return False
         except OSError as error:
@@ -250,15 +250,15 @@ class LoopbackBus(can.BusABC):
             magic, kind, end, number, taken = HEAD.unpack_from(datagram)
             if sender != (HOST, self._base + end):
                 pass
-            elif end == self._end:
+            elif end == self.end:
                 if magic == MAGIC and kind == WAKE and number == self._wakes:
                     self._woken.set()
             elif magic == MAGIC and end < CHANNEL_ENDS:
                 port = self._base + end
-                self._handle(self._peers.get(port) or self._newcomer(port), kind, number, taken, datagram)
+                self._handle(self.peers.get(port) or self._newcomer(port), kind, number, taken, datagram)
         return True
 
-    def _handle(self, peer: _Peer, kind: int, number: int, taken: int, datagram: bytes) -> None:
+    def _handle(self, peer: Peer, kind: int, number: int, taken: int, datagram: bytes) -> None:
         if peer.deaf:
             peer.deaf, peer.acked = False, peer.sent
         elif peer.acked < taken <= peer.sent:
@@ -272,16 +272,16 @@ class LoopbackBus(can.BusABC):
         elif kind == BYE:
             self._forget(peer)
 
-    def _newcomer(self, port: int) -> _Peer:
+    def _newcomer(self, port: int) -> Peer:
         # A new dict: a sender may be going through the old one.
-        peer = _Peer(port)
-        self._peers = {**self._peers, port: peer}
+        peer = Peer(port)
+        self.peers = {**self.peers, port: peer}
         return peer
 
-    def _forget(self, gone: _Peer) -> None:
-        self._peers = {port: peer for port, peer in self._peers.items() if peer is not gone}
+    def _forget(self, gone: Peer) -> None:
+        self.peers = {port: peer for port, peer in self.peers.items() if peer is not gone}
 
-    def _receive(self, peer: _Peer, number: int, datagram: bytes) -> None:
+    def _receive(self, peer: Peer, number: int, datagram: bytes) -> None:
         missed = number - peer.received - 1
         if missed > 0 and peer.received:  # the first may be for the one who had this port before
             self.lost_frames += missed
@@ -305,7 +305,7 @@ class LoopbackBus(can.BusABC):
             )
         )
 
-    def _has_room(self, peer: _Peer) -> bool:
+    def _has_room(self, peer: Peer) -> bool:
         """Wait until an end has taken some of what it got; return whether it did. One that was killed is forgotten."""
         end_s = time.monotonic() + DEAF_S
         port = peer.port
@@ -325,7 +325,7 @@ class LoopbackBus(can.BusABC):
 
     def _await(self, wait_s: float) -> None:
         try:
-            select.select((self._socket,), (), (), wait_s)
+            select.select((self.socket,), (), (), wait_s)
         except (OSError, ValueError):  # closed meanwhile
             raise can.CanOperationError(f"{self.channel_info}: the end is closed") from None
 

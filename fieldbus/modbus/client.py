@@ -70,7 +70,7 @@ class ModbusClient:
         self._timeout_s = timeout_s
         self._context = None if tls is None else client_context(tls)
         self._handshake_timeout_s = 0.0 if tls is None else tls.handshake_timeout_s
-        self._socket: socket.socket | None = None
+        self.line: socket.socket | None = None
         self._received = b""
 
     def open(self) -> None:
@@ -92,13 +92,13 @@ class ModbusClient:
         except OSError:
             raise NobodyThere(f"nobody accepts a connection within {1e3 * self._timeout_s:g} ms") from None
         plain.setsockopt(socket.IPPROTO_TCP, socket.TCP_NODELAY, 1)
-        self._socket = plain if self._context is None else self._secured(plain, self._context)
+        self.line = plain if self._context is None else self._secured(plain, self._context)
 
     def close(self) -> None:
         """End the connection. Never raises."""
-        if self._socket is not None:
-            self._socket.close()
-            self._socket = None
+        if self.line is not None:
+            self.line.close()
+            self.line = None
 
     def transact(self, pdu: bytes) -> bytes:
         """Return the PDU that answers a request's.
@@ -108,7 +108,7 @@ class ModbusClient:
             ReplyTimeout: no whole reply within the time-out.
             UnexpectedReply: of another transaction, protocol or unit, or no frame.
         """
-        line = self._socket
+        line = self.line
         if line is None:
             raise NotConnected(CLOSED)
         try:
@@ -124,7 +124,7 @@ class ModbusClient:
 
         None: nothing was sent, and `transact` says why. A secured connection is ready without a reply, too.
         """
-        line = self._socket
+        line = self.line
         if line is None or self._context is not None:
             return None
         try:
@@ -145,7 +145,7 @@ class ModbusClient:
         Raises:
             ClientError: as `transact`.
         """
-        line = self._socket
+        line = self.line
         if line is None:
             raise NotConnected(CLOSED)
         try:

@@ -80,7 +80,7 @@ def _identity_in(certificate: bytes) -> Identity:
     until_s = parsed.not_valid_after_utc.timestamp()
     for extension in parsed.extensions:
         if extension.oid.dotted_string == ROLE_OID and isinstance(extension.value, x509.UnrecognizedExtension):
-            return Identity(name, _role(extension.value.value), until_s, parsed.serial_number)
+            return Identity(name, role_in(extension.value.value), until_s, parsed.serial_number)
     return Identity(name, Role.NONE, until_s, parsed.serial_number)
 
 
@@ -90,7 +90,8 @@ def role_extension(role: Role) -> bytes:
     return bytes((_UTF8_STRING, len(text))) + text
 
 
-def _role(value: bytes) -> Role:
+def role_in(value: bytes) -> Role:
+    """Return the role that an extension's value names; NONE of any other."""
     return next((role for role in Role if role and role_extension(role) == value), Role.NONE)
 
 

@@ -89,7 +89,7 @@ class RegisterAnswers:
     def __init__(self, registers: Registers) -> None:
         self.lock = Lock()
         """Held while a request is answered; hold it to change the registers from outside. Each unit has its own."""
-        self._registers = registers
+        self.registers = registers
         self._functions: dict[int, Callable[[Any, str], bytes]] = {
             3: self._read,
             4: self._read,
@@ -117,21 +117,21 @@ class RegisterAnswers:
         return self._words(function, "holding" if function == 3 else "input", request.address, request.count)
 
     def _write_one(self, request: WriteSingleRegisterRequest, peer: str) -> bytes:
-        self._registers.write(request.address, request.registers, peer)
+        self.registers.write(request.address, request.registers, peer)
         return struct.pack(">BHH", request.function_code, request.address, *request.registers)
 
     def _write(self, request: WriteMultipleRegistersRequest, peer: str) -> bytes:
-        self._registers.write(request.address, request.registers, peer)
+        self.registers.write(request.address, request.registers, peer)
         return struct.pack(">BHH", request.function_code, request.address, request.count)
 
     def _write_then_read(self, request: ReadWriteMultipleRegistersRequest, peer: str) -> bytes:
         # The write comes first; but a read that would be refused must refuse the write with it.
-        self._registers.read("holding", request.read_address, request.read_count)
-        self._registers.write(request.write_address, request.write_registers, peer)
+        self.registers.read("holding", request.read_address, request.read_count)
+        self.registers.write(request.write_address, request.write_registers, peer)
         return self._words(request.function_code, "holding", request.read_address, request.read_count)
 
     def _words(self, function: int, table: Table, address: int, count: int) -> bytes:
-        words = self._registers.read(table, address, count)
+        words = self.registers.read(table, address, count)
         return struct.pack(f">BB{count}H", function, 2 * count, *words)
 
 

@@ -54,7 +54,7 @@ class SerialLine:
     """
 
     def __init__(self, port: SerialPort) -> None:
-        self._port = port
+        self.port = port
         self._real = ""
         self._taken: _OpenLine | None = None
 
@@ -70,10 +70,10 @@ class SerialLine:
             OSError: it is not there, not a serial line, not permitted, of another process, or not that fast.
         """
         self.close()
-        self._real = os.path.realpath(self._port.path)
+        self._real = os.path.realpath(self.port.path)
         taken = _OPEN_LINES.get(self._real)
         if taken is None:
-            taken = _OPEN_LINES[self._real] = _OpenLine(_opened(self._port), 0, time.monotonic())
+            taken = _OPEN_LINES[self._real] = _OpenLine(_opened(self.port), 0, time.monotonic())
         taken.users += 1
         self._taken = taken
 
@@ -101,7 +101,7 @@ class SerialLine:
         taken = self._open_line()
         give_up_s = time.monotonic() + within_s
         while True:
-            free_s = taken.active_s + self._port.silence_s
+            free_s = taken.active_s + self.port.silence_s
             now_s = time.monotonic()
             if now_s < free_s:
                 time.sleep(free_s - now_s)
@@ -111,8 +111,8 @@ class SerialLine:
                 raise NeverSilent
         if os.write(taken.fd, frame) != len(frame):
             raise OSError(errno.EIO, "the line takes no more")
-        out_s = taken.active_s = time.monotonic() + len(frame) * self._port.character_s
-        if self._port.local_echo:
+        out_s = taken.active_s = time.monotonic() + len(frame) * self.port.character_s
+        if self.port.local_echo:
             taken.behind_echo = self._behind_echo(frame, out_s + within_s)
         return out_s
 

@@ -105,10 +105,11 @@ def _lines(events: Iterable[Event], without: Container[int]) -> Iterator[Happene
         if before is not None and after.number > before.number + 1:
             yield Happened(after.time_s, f"{after.number - before.number - 1} events before this, which were not read")
         if after.kind not in without:
-            yield _put_in_words(after)
+            yield put_in_words(after)
 
 
-def _put_in_words(event: Event) -> Happened:
+def put_in_words(event: Event) -> Happened:
+    """Return an event as a line that a page shows."""
     if event.kind == EventKind.HEALTH:
         ne107 = code_text("event_class", event.ne107)
         return Happened(event.time_s, f"NE 107: {ne107}" + (f", {event.text}" if event.text else ""))

@@ -46,14 +46,14 @@ def run(arguments: argparse.Namespace) -> int:
 
     if arguments.set_password is not None:
         return set_role_password(arguments.roles, arguments.set_password, "--roles")
-    places = list(_places(arguments))
+    places = list(daemon_places(arguments))
     sign_in = None if arguments.roles is None else SignIn(read_passwords(arguments.roles))
     where = listening(arguments)
     serve_valves(places, where, sign_in, opens_browser=not arguments.no_open)
     return 0
 
 
-def _places(arguments: argparse.Namespace) -> "Iterator[Place]":
+def daemon_places(arguments: argparse.Namespace) -> "Iterator[Place]":
     """Yield where each valve is served.
 
     Raises:

@@ -67,7 +67,7 @@ def run(arguments: argparse.Namespace) -> int:
         kept(found.outcome, file, arguments, arguments.keep or "")
     if not found.proposals:
         return 1
-    return _write_proposals(path, file, found.proposals, arguments)
+    return write_proposals(path, file, found.proposals, arguments)
 
 
 def _file(path: Path, name: str | None) -> "DaemonFile":
@@ -93,7 +93,7 @@ def _file(path: Path, name: str | None) -> "DaemonFile":
     return validate(DaemonFile, whole | {"valve": valve | {"stroke_m": STROKE_UNKNOWN_M}}, str(path), path.parent)
 
 
-def _write_proposals(
+def write_proposals(
     path: Path, file: "DaemonFile", proposals: "tuple[Proposal, ...]", arguments: argparse.Namespace
 ) -> int:
     """Show what is proposed, ask, and write it; 0 if it was written."""

@@ -236,7 +236,7 @@ def _run_steps(arguments: argparse.Namespace) -> int:
         picture = _picture(folder, outcome)
         if arguments.out:
             _print_line(f"picture {picture}, recordings {_recording(folder)}, {_recording(folder, SLIDES)}")
-            print("in a browser:", *_in_a_browser(_recording(folder)), sep="\n  ")
+            print("in a browser:", *page_commands(_recording(folder)), sep="\n  ")
         if arguments.json:
             write_json(arguments.json, _jsonable(outcome, time.monotonic() - started_s), indent=1)
         print(_summary(outcome))
@@ -298,7 +298,7 @@ def _play_paper(port: int, valve: "ValveParameters", powered_s: float) -> DemoOu
             by_steps_pu=by_steps_pu(valve),
             until_s=powered_s + AGES_AT_S,
         )
-        _observe(dcs, AGES_AT_S + 0.5 - (time.monotonic() - powered_s), "the packing ages by 30 %")
+        observe(dcs, AGES_AT_S + 0.5 - (time.monotonic() - powered_s), "the packing ages by 30 %")
         steps += _steps(dcs, "aged", PAPER_STEPS, limit_pu=None)
         aged = _age_packing(valve)
         identified += identify(dcs, "aged", AGED_ALPHA_PA, aged)
@@ -336,8 +336,8 @@ def _play_slides(port: int, valve: "ValveParameters") -> DemoOutcome:
 
 def _begin(dcs: "Dcs") -> None:
     """Look on while nothing moves; then choose automatic."""
-    _observe(dcs, 0.5, "S0, nothing moves")
-    _acknowledge(dcs)
+    observe(dcs, 0.5, "S0, nothing moves")
+    acknowledge_faults(dcs)
     dcs.set("mode", Mode.AUTOMATIC)
 
 
@@ -346,7 +346,7 @@ def _statistics(dcs: "Dcs") -> dict[str, float]:
     return dcs.get_all(*(register.name for register in STATISTICS))
 
 
-def _acknowledge(dcs: "Dcs") -> bool:
+def acknowledge_faults(dcs: "Dcs") -> bool:
     """Acknowledge, as an operator would, what a busy machine has latched, and say it; return whether anything was."""
 
     for number in range(ACKNOWLEDGEMENTS):
@@ -354,7 +354,7 @@ def _acknowledge(dcs: "Dcs") -> bool:
             return number > 0
         _print_line(f"acknowledged: {Fault(fault).text}")
         dcs.set("acknowledge", 1)
-        _observe(dcs, 0.5, "S0, nothing moves")
+        observe(dcs, 0.5, "S0, nothing moves")
     return True
 
 
@@ -362,7 +362,7 @@ def _resume_automatic(dcs: "Dcs") -> None:
     """Choose automatic again after a fault, from where the stem is; where it comes back meanwhile, it stays so."""
     from positioner.dcs import DcsError
 
-    position_pu = dcs.get("position") if _acknowledge(dcs) else math.nan
+    position_pu = dcs.get("position") if acknowledge_faults(dcs) else math.nan
     if math.isfinite(position_pu):
         with suppress(DcsError):
             dcs.set("reference", min(max(position_pu, 0.0), 1.0))
@@ -428,16 +428,16 @@ def _step(dcs: "Dcs", phase: str, reference_pu: float, step_s: float) -> tuple[f
 
     dcs.set("reference", reference_pu)
     label = f"{phase}: step to {reference_pu:g} p.u."
-    _observe(dcs, BEGUN_S, label)
+    observe(dcs, BEGUN_S, label)
     by_steps = False
     while int(dcs.get("why")) == InhibitReason.ONE_DIRECTION:  # the sine has seen the stem move upward alone
         by_steps = True
-        _observe(dcs, BEGUN_S, label)
-    _observe(dcs, step_s - SETTLED_S - BEGUN_S, label)
-    return _observe(dcs, SETTLED_S, label), by_steps
+        observe(dcs, BEGUN_S, label)
+    observe(dcs, step_s - SETTLED_S - BEGUN_S, label)
+    return observe(dcs, SETTLED_S, label), by_steps
 
 
-def _observe(dcs: "Dcs", duration_s: float, label: str) -> float:
+def observe(dcs: "Dcs", duration_s: float, label: str) -> float:
     """Look on for a while; return the mean position, p.u."""
     end_s = time.monotonic() + duration_s
     positions = []
@@ -535,7 +535,7 @@ def _jsonable(outcome: DemoOutcome, seconds: float) -> dict[str, object]:
     }
 
 
-def _in_a_browser(recording: Path) -> Iterator[str]:
+def page_commands(recording: Path) -> Iterator[str]:
     """Yield what to type to see the recording, and a running valve, from the folder where this was typed."""
     from config.loading import SHIPPED
 

@@ -56,32 +56,38 @@ def run(arguments: argparse.Namespace) -> int:
 
     path = config_file(arguments)
     files = load_valves(path)
-    well = _passes("packages", "", _packages)
+    well = passes("packages", "", check_packages)
     nudge_pa: float | None = arguments.nudge_pa
     nudged = () if nudge_pa is None else (("sampling", partial(_sampling, nudge_pa)),)
     checks: list[tuple[str, Check, DaemonFile]] = [
         *(
             (name, check, file)
             for file in files
-            for name, check in (("law", _law), ("bus", _bus), *nudged, ("recorder", _recorder), ("memory", _memory))
+            for name, check in (
+                ("law", _law),
+                ("bus", check_bus),
+                *nudged,
+                ("recorder", _recorder),
+                ("memory", _memory),
+            )
         ),
         *(
             (name, check, files[0])
             for name, check in (("supervisory", _supervisory), ("history", _history), ("timing", _timing))
         ),
         *((name, check, files[0]) for name, check in (("system", _system), ("priority", _priority))),
-        *(("certificates", _certificates, file) for file in files),
+        *(("certificates", check_certificates, file) for file in files),
     ]
     for file in files:
-        well = _passes("config", "", partial(_config, file, path)) and well
-    well = _passes("load", "", partial(_load, files)) and well
+        well = passes("config", "", partial(_config, file, path)) and well
+    well = passes("load", "", partial(_load, files)) and well
     for name, check, file in checks:
         valve = f"{file.valve.name}: " if len(files) > 1 and name in OF_A_VALVE else ""
-        well = _passes(name, valve, partial(check, file, path)) and well
+        well = passes(name, valve, partial(check, file, path)) and well
     return 0 if well else 1
 
 
-def _passes(name: str, valve: str, check: Callable[[], str]) -> bool:
+def passes(name: str, valve: str, check: Callable[[], str]) -> bool:
     """Make a check and print its line; return whether all is well."""
     try:
         print(f"{name:12} ok    {valve}{check()}")
@@ -91,7 +97,8 @@ def _passes(name: str, valve: str, check: Callable[[], str]) -> bool:
     return True
 
 
-def _packages() -> str:
+def check_packages() -> str:
+    """Say where the packages are; FailedCheck where another's stand in their way."""
     from positioner.own_packages import HOME, OWN, in_the_way, sharing
 
     if said := in_the_way() or sharing():
@@ -132,7 +139,8 @@ def _law(file: "DaemonFile", config: Path) -> str:
     return f"{file.control.law}, with the inverse of {file.law.valve}"
 
 
-def _bus(file: "DaemonFile", _config: Path) -> str:
+def check_bus(file: "DaemonFile", _config: Path) -> str:
+    """Say what the device shows; FailedCheck where it does not answer, or too seldom."""
 
     from drivers.boundary import DriverError, ForeseesRefusal, NoReply
     from positioner.cli.probe import unfit, watching_driver
@@ -212,7 +220,8 @@ def _supervisory(file: "DaemonFile", _config: Path) -> str:
     return f"{host}:{port} is free"
 
 
-def _certificates(file: "DaemonFile", _config: Path) -> str:
+def check_certificates(file: "DaemonFile", _config: Path) -> str:
+    """Say until when each certificate holds; FailedCheck of one that ends soon or cannot be read."""
 
     from fieldbus.modbus.tls import expiry
 

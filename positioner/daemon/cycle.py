@@ -54,7 +54,7 @@ class Cycle:
         self.health = health
         self.history = history
         self._controller = controller
-        self._pace = pace
+        self.pace = pace
         self._valve = valve
         sent_pa = controller.command_pa
         self.snapshot = self._decided(sent_pa, link.exchange(sent_pa))
@@ -62,14 +62,14 @@ class Cycle:
     def prepare(self) -> None:
         """Make the calling thread, which takes the turns, as punctual as can be."""
         with logging_valve(self._valve):
-            self._pace.prepare()
+            self.pace.prepare()
             self.link.begin()
             self._controller.begin()
 
     def turn(self) -> None:
         """Wait until the next cycle is due and run it."""
         with logging_valve(self._valve):
-            missed = self._pace.wait()
+            missed = self.pace.wait()
             started_s = time.monotonic()
             self.once()
             self.statistics.enter(started_s, time.monotonic() - started_s, missed)
@@ -94,7 +94,7 @@ class Cycle:
 
     def since_s(self, snapshot: Snapshot) -> float:
         """Return how long ago a snapshot was made. Called by any thread."""
-        return self._pace.since_s(snapshot.sample.now_s)
+        return self.pace.since_s(snapshot.sample.now_s)
 
     def once(self) -> None:
         """Run one cycle."""
@@ -118,7 +118,7 @@ class Cycle:
         if self.recorder is not None and sample.quality is GOOD:
             # A device that was only looked at has got nothing.
             given_pa = sent_pa if sample.held_pa is None else sample.held_pa
-            in_force_pa = self._pace.in_force_pa(given_pa, decision.command_pa)
+            in_force_pa = self.pace.in_force_pa(given_pa, decision.command_pa)
             self.recorder.offer(_row(sample, decision, in_force_pa, self.link.counts.lost_samples))
         if self.health is not None:
             self.health.enter(sample, decision, self.requests)

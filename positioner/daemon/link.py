@@ -127,7 +127,7 @@ class Link:
         self, driver: Driver, pace: Pace, settings: LinkSettings | None = None, doors: Doors | None = None
     ) -> None:
         self.counts = LinkCounts()
-        self._driver = driver
+        self.driver = driver
         # Asking what a driver can do takes a tenth of a cycle.
         self._reads_back = driver if isinstance(driver, ReadsBack) else None
         self._keeps_settings = driver if isinstance(driver, KeepsSettings) else None
@@ -139,7 +139,8 @@ class Link:
         self._doors = doors
         self._lost_a_reply = False
         """Whether the device was there until its last reply was lost."""
-        self._longest_unattended_s = self._settings.longest_unattended_s
+        self.longest_unattended_s = self._settings.longest_unattended_s
+        """From one command to the next; later, this daemon stood still."""
         self._read_back_s = -math.inf
         self._read_backs = 0
         self._restarted = False
@@ -170,32 +171,25 @@ class Link:
             DriverError: the device is not there or does not answer as it should.
         """
         said = "no reply at the start, asked again"
-        held_pa, reading = first_reading(
-            self._driver, lambda error: self._say(logging.WARNING, said, reason=str(error))
-        )
+        held_pa, reading = first_reading(self.driver, lambda error: self._say(logging.WARNING, said, reason=str(error)))
         self._connected = self._was_reached = True
         self._was_away = False
         return self._in_force_pa(held_pa, reading), reading
-
-    @property
-    def longest_unattended_s(self) -> float:
-        """From one command to the next; later, this daemon stood still."""
-        return self._longest_unattended_s
 
     def exchange(self, command_pa: float) -> Sample:
         """Command a pressure and return the sample that comes back, or what is known without it."""
         now_s = self._asked_s = awake_s()
         self._notice_a_stall(now_s, command_pa)
         try:
-            held_pa = self._overwritten_pa() if self._connected else None
+            held_pa = self.overwritten_pa() if self._connected else None
             if held_pa is not None:
                 self._commanded_s = now_s
-                sample = self._fresh(self._driver.read(), held_pa)
+                sample = self._fresh(self.driver.read(), held_pa)
                 self._sample = sample._replace(held_pa=held_pa, overwritten=True)
             elif self._connected:
                 self._commanded_s = now_s
                 told_pa, self._told_pa = self._told_pa, None
-                reading = self._driver.read() if self._settings.shadow else self._driver.exchange(command_pa)
+                reading = self.driver.read() if self._settings.shadow else self.driver.exchange(command_pa)
                 self._take(reading, command_pa, told_pa)
             elif (self._unattended_s > 0 or self._backoff.may_try(now_s)) and (
                 (door := self._door) is None or door.acquire(blocking=False)
@@ -222,7 +216,7 @@ class Link:
     def reply_timeout_s(self) -> float | None:
         """How long an answer may take that need not be waited for; None: this device is one that keeps its thread."""
         driver = self._ahead
-        may = driver is not None and not self._settings.shadow and self._driver.capabilities.one_transaction
+        may = driver is not None and not self._settings.shadow and self.driver.capabilities.one_transaction
         return driver.reply_timeout_s if driver is not None and may else None
 
     def ask(self, command_pa: float) -> int | None:
@@ -231,7 +225,7 @@ class Link:
         None: `exchange` is to be called.
         """
         driver, now_s = self._ahead, awake_s()
-        late = now_s - self._commanded_s > self._longest_unattended_s
+        late = now_s - self._commanded_s > self.longest_unattended_s
         if driver is None or not self._connected or late or self._reads_back_now:
             return None
         self._asked_s = self._commanded_s = now_s
@@ -260,7 +254,7 @@ class Link:
         self._refusals = 0
         if self._began_anew(reading):
             self._say(logging.WARNING, "device began anew", device_time_s=reading.device_time_s)
-            self._driver.close()
+            self.driver.close()
             self._connected, self._was_away = False, True
             self._sample = self._lost()
         else:
@@ -282,20 +276,20 @@ class Link:
         """
         if self._settings.shadow:
             return
-        alone = not self._connected or awake_s() - self._commanded_s > self._longest_unattended_s
+        alone = not self._connected or awake_s() - self._commanded_s > self.longest_unattended_s
         if holds and alone:
             log_event(log, logging.WARNING, "device is lost, and left with what it has", command_pa=command_pa)
             return
         try:
             if not self._connected:
-                self._driver.open()
-            self._driver.write(command_pa)
+                self.driver.open()
+            self.driver.write(command_pa)
         except DriverError as error:
             log_event(log, logging.ERROR, "device not left as configured", reason=str(error), command_pa=command_pa)
 
     def release(self) -> None:
         """Close the connection."""
-        self._driver.close()
+        self.driver.close()
 
     @property
     def _door(self) -> Semaphore | None:
@@ -306,7 +300,7 @@ class Link:
 
     def _notice_a_stall(self, now_s: float, command_pa: float) -> None:
         """Have a device that was left alone looked at before it is commanded; say so where this daemon stood still."""
-        since_s, allowed_s = self._commanded_s if self._connected else self._returned_s, self._longest_unattended_s
+        since_s, allowed_s = self._commanded_s if self._connected else self._returned_s, self.longest_unattended_s
         if now_s - since_s <= allowed_s:
             return
         self._connected = False
@@ -322,7 +316,7 @@ class Link:
             commanded_pa=command_pa,
         )
 
-    def _overwritten_pa(self) -> float | None:
+    def overwritten_pa(self) -> float | None:
         """Return what the device holds, if it is time to ask, and it is not what it was told."""
         told_pa, driver = self._told_pa, self._reads_back
         if not self._reads_back_now or told_pa is None or driver is None:
@@ -357,9 +351,9 @@ class Link:
 
     def _found_again(self) -> Sample:
         """Connect anew, and look at what the device holds and says without commanding it."""
-        self._driver.close()
-        set_point_pa = self._driver.open()
-        reading = self._driver.read()
+        self.driver.close()
+        set_point_pa = self.driver.open()
+        reading = self.driver.read()
         held_pa = self._in_force_pa(set_point_pa, reading)
         before, self._reading = self._reading, None
         self._told_pa = self._pressure_pa = None
@@ -409,7 +403,7 @@ class Link:
         if self._connected and (isinstance(error, NoNumber) or (refused and self._refusals < MOST_REFUSALS)):
             self._refusals += refused
             return
-        self._driver.close()
+        self.driver.close()
         self._lost_a_reply, self._connected = self._connected, False
         now_s = awake_s()
         self._backoff.failed(now_s, now_s - self._asked_s)
@@ -466,7 +460,7 @@ class Link:
             return reading.device_time_s < before.device_time_s
         if reading.sample_counter is None or before.sample_counter is None:
             return False
-        counted = self._driver.capabilities.counter_range
+        counted = self.driver.capabilities.counter_range
         return counted >= LONG_COUNTER and (reading.sample_counter - before.sample_counter) % counted > counted // 2
 
     def _count(self, reading: Reading) -> bool:
@@ -477,7 +471,7 @@ class Link:
         if reading.sample_counter is not None and before.sample_counter is not None:
             passed = reading.sample_counter - before.sample_counter
             if passed < 0:  # it began at 0 again
-                passed %= self._driver.capabilities.counter_range
+                passed %= self.driver.capabilities.counter_range
             self.counts.lost_samples += max(passed - 1, 0)
             return passed == 0
         return _same_sample(before, reading)

@@ -85,7 +85,7 @@ class Recorder:
         self._file_bytes = file_bytes
         self._keep_files = keep_files
         self._file_s = file_s or math.inf
-        self._compression = Compression() if compress else None
+        self.compression = Compression() if compress else None
         self._waiting: deque[tuple[Row, int]] = deque()
         self._stopping = Event()
         self._thread = Thread(target=self._work, name="recorder", daemon=True)
@@ -122,8 +122,8 @@ class Recorder:
         """Write what waits and close the file."""
         self._stopping.set()
         self._thread.join()
-        if self._compression is not None:
-            self._compression.stop()
+        if self.compression is not None:
+            self.compression.stop()
 
     def _work(self) -> None:
         writes, failed = 0, False
@@ -201,10 +201,10 @@ class Recorder:
                 old.unlink(missing_ok=True)
             except OSError as error:
                 log_event(log, logging.WARNING, "old recording stays", file=str(old), reason=error.strerror)
-        if self._compression is not None:
+        if self.compression is not None:
             for path in find_compressed_twins(self._folder, self._stem):
                 path.unlink(missing_ok=True)
-            self._compression.begin(
+            self.compression.begin(
                 [each for each in files_of_stem(self._folder, self._stem)[:-2] if each.suffix == ".csv"]
             )
 

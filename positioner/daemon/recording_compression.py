@@ -29,32 +29,32 @@ class Compression:
     """The process, while there is one. In the recorder's thread."""
 
     def __init__(self) -> None:
-        self._process: subprocess.Popen[bytes] | None = None
+        self.process: subprocess.Popen[bytes] | None = None
 
     def begin(self, files: Sequence[Path]) -> None:
         """Compress files; those of a process that still works are left to it, and the others to the next time."""
-        if self._process is not None:
-            if (status := self._process.poll()) is None:
+        if self.process is not None:
+            if (status := self.process.poll()) is None:
                 return
             if status:
                 log_event(log, logging.WARNING, "recordings stay uncompressed", status=status)
-            self._process = None
+            self.process = None
         if files:
             words = [sys.executable, "-P", "-m", "positioner.daemon.recording_compression", *map(str, files)]
             try:
-                self._process = subprocess.Popen(words, stdin=subprocess.DEVNULL, start_new_session=True)
+                self.process = subprocess.Popen(words, stdin=subprocess.DEVNULL, start_new_session=True)
             except OSError as error:
                 log_event(log, logging.WARNING, "recordings stay uncompressed", reason=error.strerror)
 
     def stop(self) -> None:
         """End it; what is left is done after the next start."""
-        if self._process is not None:
-            self._process.terminate()
+        if self.process is not None:
+            self.process.terminate()
             with suppress(subprocess.TimeoutExpired):
-                self._process.wait(ENDING_S)
-            self._process.kill()
-            self._process.wait()
-            self._process = None
+                self.process.wait(ENDING_S)
+            self.process.kill()
+            self.process.wait()
+            self.process = None
 
 
 def half_done(path: Path) -> Path:
@@ -75,7 +75,7 @@ def compress(path: Path) -> None:
                 copyfileobj(plain, into, BLOCK_BYTES)
             packed.flush()
             os.fsync(packed.fileno())
-        if not _same(path, beside):
+        if not reads_back(path, beside):
             raise OSError(f"{beside}: does not read back as it was written")
         beside.replace(path.with_name(f"{path.name}.gz"))
     except BaseException:
@@ -85,7 +85,8 @@ def compress(path: Path) -> None:
     path.unlink(missing_ok=True)
 
 
-def _same(path: Path, packed: Path) -> bool:
+def reads_back(path: Path, packed: Path) -> bool:
+    """Return whether a compressed file holds what the plain one does."""
     with path.open("rb") as plain, gzip.open(packed) as back:
         while block := plain.read(BLOCK_BYTES):
             if back.read(len(block)) != block:

@@ -105,7 +105,7 @@ class RefinementProcess:
                 result = self._done(job)
                 self._failures = 0
             except (OSError, EOFError, pickle.UnpicklingError) as error:
-                self._give_up(str(error) or "it ended")
+                self.give_up(str(error) or "it ended")
             refiner.deliver(result)
         self._close()
 
@@ -115,7 +115,7 @@ class RefinementProcess:
             with suppress(Empty):
                 return self._jobs.get(timeout=LOOK_EVERY_S)
             if self.child is not None and self.child.poll() is not None:
-                self._give_up(f"it ended by itself, {_ended(self.child.returncode)}")
+                self.give_up(f"it ended by itself, {_ended(self.child.returncode)}")
 
     def _done(self, job: RefinementJob) -> BatchResult | None:
         """Have a job done.
@@ -133,7 +133,7 @@ class RefinementProcess:
         result: BatchResult | None = pickle.load(up)
         return result
 
-    def _give_up(self, reason: str) -> None:
+    def give_up(self, reason: str) -> None:
         """End what is left of the process; it is not started again for a while."""
         wait_s = min(FIRST_S * 2.0**self._failures, LONGEST_S)
         self._failures = min(self._failures + 1, MOST_FAILURES)

@@ -87,28 +87,28 @@ class Workers:
     def __init__(
         self, shares: Sequence[Share], counts: RequestCounts, tell: Callable[[Told], None], on_exit: ExitStack
     ) -> None:
-        self._workers = [Worker(share, counts, tell) for share in shares]
+        self.workers = [Worker(share, counts, tell) for share in shares]
         self._looks = 0
-        for each in self._workers:
+        for each in self.workers:
             on_exit.callback(each.kill)
             each.start()
-        for each in self._workers:
+        for each in self.workers:
             each.await_ready()
         self.registers: Mapping[int, Registers] = {
             file.supervisory.unit: RegistersElsewhere(each, file.supervisory.unit)
-            for each, share in zip(self._workers, shares, strict=True)
+            for each, share in zip(self.workers, shares, strict=True)
             for file in share.files
         }
 
     def begin(self) -> None:
         """Have all cycle."""
-        for each in self._workers:
+        for each in self.workers:
             each.begin()
 
     def look(self, wait_s: float) -> None:
         """Wait for news; start again who has ended."""
-        wait([each.news for each in self._workers if each.news is not None], wait_s)
-        for each in self._workers:
+        wait([each.news for each in self.workers if each.news is not None], wait_s)
+        for each in self.workers:
             each.look()
         self._looks += 1
 
@@ -119,10 +119,10 @@ class Workers:
 
     def end(self, endings: Endings) -> None:
         """Tell all to end, and wait until they have."""
-        for each in self._workers:
+        for each in self.workers:
             each.tell_to_end(endings.signal)
-        until_s = time.monotonic() + ENDING_S + max(each.slowest_s for each in self._workers)
-        for each in self._workers:
+        until_s = time.monotonic() + ENDING_S + max(each.slowest_s for each in self.workers)
+        for each in self.workers:
             each.wait_for_the_end(until_s)
 
 
@@ -137,13 +137,13 @@ class Worker:
         self._names = ", ".join(each.valve.name for each in share.files)
         self._counts = counts
         self._tell = tell
-        self._process: subprocess.Popen[bytes] | None = None
+        self.process: subprocess.Popen[bytes] | None = None
         self._calls: Connection | None = None
         self._asking = Lock()
         self._unanswered = 0
         self._may_begin = self._is_ready = self._serves = self._is_to_end = False
         self._begun_s = self._turned_s = self._again_s = 0.0
-        self._failures = 0
+        self.failures = 0
         self._fault: InputError | None = None
 
     def start(self) -> None:
@@ -155,7 +155,7 @@ class Worker:
         with its_calls, its_news, tempfile.TemporaryFile() as share:
             pickle.dump(self._share, share)
             share.seek(0)
-            self._process = subprocess.Popen(
+            self.process = subprocess.Popen(
                 [sys.executable, "-P", "-m", "positioner.daemon.workers", *map(str, ends)],
                 stdin=share,
                 pass_fds=ends,
@@ -192,9 +192,9 @@ class Worker:
         if self.news is not None:
             self._hear()
             stands_s = max(STANDS_S, SLOWEST_CYCLES * self.slowest_s)
-            if self._serves and self._process is not None and now_s - self._turned_s > stands_s:
-                log_event(log, logging.ERROR, "a worker's cycles stand", valves=self._names, pid=self._process.pid)
-                self._process.kill()
+            if self._serves and self.process is not None and now_s - self._turned_s > stands_s:
+                log_event(log, logging.ERROR, "a worker's cycles stand", valves=self._names, pid=self.process.pid)
+                self.process.kill()
                 self._turned_s = now_s  # its end is heard of with a later look, and said once
         elif now_s >= self._again_s:
             try:
@@ -220,15 +220,15 @@ class Worker:
     def tell_to_end(self, signal: int) -> None:
         """Have it leave its valves in their safe states."""
         self._is_to_end = True
-        if self._process is not None:
-            self._process.send_signal(signal)
+        if self.process is not None:
+            self.process.send_signal(signal)
 
     def wait_for_the_end(self, until_s: float) -> None:
         """Wait for it, but no longer."""
-        if self._process is None:
+        if self.process is None:
             return
         try:
-            self._process.wait(max(until_s - time.monotonic(), 0.0))
+            self.process.wait(max(until_s - time.monotonic(), 0.0))
         except subprocess.TimeoutExpired:
             log_event(log, logging.ERROR, "a worker does not end, and is killed", valves=self._names)
         if self.news is not None:
@@ -237,9 +237,9 @@ class Worker:
 
     def kill(self) -> None:
         """Make sure that it is gone."""
-        if self._process is not None:
-            self._process.kill()
-            self._process.wait()
+        if self.process is not None:
+            self.process.kill()
+            self.process.wait()
         self._forget()
 
     def _answer(self, call: Call) -> Sequence[int] | ExcCodes:
@@ -281,7 +281,7 @@ class Worker:
                 self._tell(news)
             elif news == READY:
                 self._is_ready = True
-                pid = None if self._process is None else self._process.pid
+                pid = None if self.process is None else self.process.pid
                 log_event(log, logging.INFO, "a worker is ready", valves=self._names, pid=pid)
                 if self._may_begin:
                     self.begin()
@@ -291,7 +291,7 @@ class Worker:
 
     def _note_the_end(self) -> None:
         """Take note that it has ended."""
-        process, status = self._process, None
+        process, status = self.process, None
         if process is not None:
             process.kill()  # it has closed its end, so it ends, or is broken
             status = process.wait()
@@ -303,9 +303,9 @@ class Worker:
         """Say why it is away, and when it is started again."""
         now_s = time.monotonic()
         if self._serves and now_s - self._begun_s > SERVED_LONG_S:
-            self._failures = 0
-        wait_s = min(FIRST_S * 2.0**self._failures, LONGEST_S)
-        self._failures += 1
+            self.failures = 0
+        wait_s = min(FIRST_S * 2.0**self.failures, LONGEST_S)
+        self.failures += 1
         self._again_s = now_s + wait_s
         told = {"valves": self._names, "reason": reason, "started_again_after_s": wait_s}
         log_event(log, logging.ERROR, "a worker has ended", **told)
@@ -313,7 +313,7 @@ class Worker:
     def _forget(self) -> None:
         with self._asking:
             calls, self._calls, self._is_ready, self._serves = self._calls, None, False, False
-        news, self.news, self._process = self.news, None, None
+        news, self.news, self.process = self.news, None, None
         for each in (calls, news):
             if each is not None:
                 each.close()

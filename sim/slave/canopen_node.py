@@ -133,8 +133,8 @@ class CanopenNode:
         self._latched: dict[int, bytes] = {}
         self._syncs = 0
         self._beat_s = 0.0
-        self._reads = self._readings()
-        self._dictionary = Dictionary(sheet, self._reads, self._settings())
+        self.reads = self._readings()
+        self._dictionary = Dictionary(sheet, self.reads, self._settings())
         server: Any = SdoServer
         self._sdo = server(0x600 + number, 0x580 + number, self._dictionary)
         self._sdo.network = self
@@ -224,7 +224,7 @@ class CanopenNode:
         self._watch()
         for pdo in self._tpdos:
             if self._syncs % pdo.transmission == 0:
-                self._send(pdo.cob_id, pdo.layout.pack(*(self._reads[each]() for each in pdo.objects)))
+                self._send(pdo.cob_id, pdo.layout.pack(*(self.reads[each]() for each in pdo.objects)))
 
     def _obey(self, pdo: Pdo, data: bytes) -> None:
         values = dict(zip(pdo.objects, pdo.layout.unpack_from(data), strict=True))

@@ -45,7 +45,7 @@ class NodeServer:
             said = " ".join(str(error).split())
             raise InputError(source, f"bus: {bus.interface} {bus.channel} cannot be opened: {said}") from None
         sheet = read_eds(SHIPPED_EDS, bus.node)
-        self.node = CanopenNode(bus.node, sheet, device, clock, self._send)
+        self.node = CanopenNode(bus.node, sheet, device, clock, self.send)
         self._stop = Event()
         self._thread = Thread(target=self._work, daemon=True, name="canopen node")
 
@@ -56,13 +56,17 @@ class NodeServer:
             InputError: another node has the id.
         """
         node = self.node.number
-        self._send(0x600 + node, bytes((0x40, 0x00, 0x10, 0, 0, 0, 0, 0)))
+        self.send(0x600 + node, bytes((0x40, 0x00, 0x10, 0, 0, 0, 0, 0)))
         end_s = time.monotonic() + LISTEN_S
         while (rest_s := end_s - time.monotonic()) > 0:
             message = self._bus.recv(rest_s)
             if message is not None and message.arbitration_id in (0x580 + node, 0x700 + node):
                 self._bus.shutdown()
                 raise InputError(self._source, f"bus.node: {node} is taken by another node on {self._bus.channel_info}")
+        self.begin()
+
+    def begin(self) -> None:
+        """Boot, and answer from now on, whoever else has the id."""
         self.node.boot()
         self._thread.start()
 
@@ -89,7 +93,8 @@ class NodeServer:
                     self.node.receive(message.arbitration_id, bytes(message.data))
                 self.node.pass_time(time.monotonic())
 
-    def _send(self, identity: int, data: bytes) -> None:
+    def send(self, identity: int, data: bytes) -> None:
+        """Put a frame on the bus."""
         with suppress(can.CanError):  # a master notices what is missing
             self._bus.send(can.Message(arbitration_id=identity, data=data, is_extended_id=False))
 

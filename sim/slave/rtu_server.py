@@ -37,7 +37,7 @@ class RtuServer(RegisterAnswers):
         self.address = port.path
         self._silence_s = port.silence_s
         self._unit = unit
-        self._line = SerialLine(port)
+        self.line = SerialLine(port)
         self._ended = Event()
         self._thread = Thread(target=self._work, daemon=True, name="modbus rtu")
 
@@ -48,7 +48,7 @@ class RtuServer(RegisterAnswers):
             InputError: the line cannot be opened.
         """
         with explain_failure(self.address, "cannot listen there"):
-            self._line.open()
+            self.line.open()
         self._thread.start()
 
     def stop(self) -> None:
@@ -56,29 +56,30 @@ class RtuServer(RegisterAnswers):
         self._ended.set()
         if self._thread.is_alive():
             self._thread.join()
-        self._line.close()
+        self.line.close()
 
     def _work(self) -> None:
         while not self._ended.is_set():
             try:
-                if not self._line.is_open:
-                    self._line.open()
+                if not self.line.is_open:
+                    self.line.open()
                     log.warning("%s: the line is back", self.address)
-                self._serve(self._frame())
+                self.serve(self._frame())
             except OSError as error:
-                if self._line.is_open:
+                if self.line.is_open:
                     log.warning("%s: %s", self.address, error.strerror)
-                self._line.close()
+                self.line.close()
                 self._ended.wait(AGAIN_AFTER_S)
 
     def _frame(self) -> bytes:
         """Return what came up to the next silence; b"" when nothing does for a while."""
-        frame = self._line.receive(time.monotonic() + LINE_LOOK_EVERY_S)
-        while data := self._line.receive(time.monotonic() + self._silence_s):
+        frame = self.line.receive(time.monotonic() + LINE_LOOK_EVERY_S)
+        while data := self.line.receive(time.monotonic() + self._silence_s):
             frame = (frame + data)[: LARGEST_FRAME + 1]  # longer is none
         return frame
 
-    def _serve(self, frame: bytes) -> None:
+    def serve(self, frame: bytes) -> None:
+        """Answer a frame; what is none, or is for another unit, is passed over."""
         if not frame:
             return
         if not is_whole(frame):
@@ -90,4 +91,4 @@ class RtuServer(RegisterAnswers):
         is_echo = pdu.startswith(ECHO)
         reply = pdu if is_echo else self.answer(pdu, self.address)
         if unit != BROADCAST:
-            self._line.send(framed(unit, reply), self._silence_s)
+            self.line.send(framed(unit, reply), self._silence_s)

@@ -151,7 +151,7 @@ def test_what_it_says_to_type_next_is_found_from_where_it_was_typed(
     recording = Path(folder) / "demo-1.csv"
     recording.parent.mkdir(exist_ok=True)
     recording.touch()
-    words = [word for line in demo._in_a_browser(recording) for word in shlex.split(line)]
+    words = [word for line in demo.page_commands(recording) for word in shlex.split(line)]
     named = [word for word in words if word.endswith((".csv", ".toml"))]
     assert len(named) == 4
     assert all(Path(each).is_file() for each in named)
@@ -197,9 +197,9 @@ class FaultyAtFirst:
 def test_faults_of_the_start_are_acknowledged_until_there_are_none(
     faults: int, left: int, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    monkeypatch.setattr(demo, "_observe", lambda *_: 0.0)
+    monkeypatch.setattr(demo, "observe", lambda *_: 0.0)
     dcs = FaultyAtFirst(faults)
-    demo._acknowledge(dcs)  # type: ignore[arg-type]
+    demo.acknowledge_faults(dcs)  # type: ignore[arg-type]
     assert dcs.faults == left
 
 
@@ -207,7 +207,7 @@ def test_faults_of_the_start_are_acknowledged_until_there_are_none(
 def test_a_fault_is_acknowledged_before_the_next_try_and_automatic_chosen_from_where_the_stem_is(
     faults: int, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    monkeypatch.setattr(demo, "_observe", lambda *_: 0.0)
+    monkeypatch.setattr(demo, "observe", lambda *_: 0.0)
     dcs = FaultyAtFirst(faults)
     identify(dcs, "new", ALPHA_PA, load_valve(shipped_valve("seed")).valve)  # type: ignore[arg-type]
     assert dcs.said == [*["acknowledge"] * faults, *["reference", "mode"] * (faults > 0)]

@@ -5,6 +5,7 @@ import time
 from collections.abc import Iterator
 from dataclasses import dataclass, replace
 from pathlib import Path
+from types import SimpleNamespace
 
 import numpy as np
 import pytest
@@ -128,17 +129,17 @@ def test_a_veto_from_elsewhere_stops_it(site: Site) -> None:
 def test_ctrl_c_breaks_it_off_and_takes_its_veto_back(site: Site, monkeypatch: pytest.MonkeyPatch) -> None:
     permitted(site)
     with site.dcs() as dcs:
-        wait = dcs._played_within
-        first = iter([True])
+        first = [True]
 
-        def interrupted(timeout_s: float) -> ExperimentState | None:
-            if next(first, False):
-                until(lambda: dcs.get("experiment_state") == ExperimentState.UNDER_WAY, "the experiment")
+        def interrupted(wait_s: float) -> None:
+            time.sleep(wait_s)
+            if first and dcs.get("experiment_state") == ExperimentState.UNDER_WAY:
+                first.clear()
                 time.sleep(0.05)
                 raise KeyboardInterrupt
-            return wait(timeout_s)
 
-        monkeypatch.setattr(dcs, "_played_within", interrupted)
+        clock = SimpleNamespace(monotonic=time.monotonic, sleep=interrupted)
+        monkeypatch.setattr("positioner.dcs.time", clock)
         with pytest.raises(KeyboardInterrupt):
             dcs.play(COURSE.points(), 30.0)
         assert dcs.get("experiment_state") == ExperimentState.VETOED

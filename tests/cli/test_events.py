@@ -105,7 +105,7 @@ def test_a_daemon_killed_while_it_is_written_to_keeps_what_was_there_and_numbers
         with child("run", path) as (daemon, ready), Dcs("127.0.0.1", port_in(ready)) as dcs:
             dcs.set("mode", Mode.MANUAL)
             with pytest.raises(Refused):
-                dcs._client.write_registers(REFERENCE.address, REFERENCE.format.encode(1.5))
+                dcs.client.write_registers(REFERENCE.address, REFERENCE.format.encode(1.5))
             until(lambda: dcs.get("event") == EventKind.MODE, "the event's register")
             number = dcs.get("event_number")
             until(lambda: len(writes(tmp_path)) >= 3, "the audit")

@@ -52,9 +52,9 @@ class Landing:
 
 def test_a_test_begins_once_the_law_has_held_its_command_for_ten_cycles(monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setattr(experiment_player, "LANDING_POLL_S", 0.0)
-    monkeypatch.setattr(experiment_player, "_folder", lambda *_: Path())
+    monkeypatch.setattr(experiment_player, "recordings_of", lambda *_: Path())
     valve = Landing()
-    monkeypatch.setattr(experiment_player, "_dcs", lambda _: nullcontext(valve))
+    monkeypatch.setattr(experiment_player, "daemon_of", lambda _: nullcontext(valve))
     assert RunningValve(cast(DaemonFile, None), argparse.Namespace()).command_pa() == 40.0
     assert valve.cycles >= 50.0
     monkeypatch.setattr(experiment_player, "LANDS_WITHIN_S", 0.0)

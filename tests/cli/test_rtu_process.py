@@ -50,7 +50,7 @@ def line(tmp_path_factory: pytest.TempPathFactory) -> Iterator[Line]:
 def test_probe_and_doctor_watch(line: Line, capsys: pytest.CaptureFixture[str]) -> None:
     assert main(["probe", str(line.daemon), "--count", "1"]) == 0
     assert ", plausible" in capsys.readouterr().out
-    word, position_m, *_ = doctor._bus(load_daemon(line.daemon), line.daemon).split()
+    word, position_m, *_ = doctor.check_bus(load_daemon(line.daemon), line.daemon).split()
     assert word == "position"
     assert float(position_m) == pytest.approx(0.03, abs=1e-4)
 

@@ -110,7 +110,7 @@ def test_one_lost_reply_fails_no_device_and_more_are_said(
     file = DaemonFile.model_validate({"valve": {"stroke_m": 0.1}, "cycle": {"period_s": 0.5}})
     monkeypatch.setattr(probe, "watching_driver", lambda _file: Lossy(loses))
     try:
-        found = doctor._bus(file, Path())
+        found = doctor.check_bus(file, Path())
     except doctor.FailedCheck as failed:
         found = str(failed)
         assert loses > 1

@@ -174,7 +174,7 @@ def test_handshakes_and_refused_clients_do_not_touch_the_cycle(site: Site) -> No
 
 def test_doctor_watches_the_certificates(site: Site, tmp_path: Path) -> None:
     file = load_daemon(site.folder / "daemon.toml")
-    assert doctor._certificates(file, site.folder).startswith("device.tls until 20")
+    assert doctor.check_certificates(file, site.folder).startswith("device.tls until 20")
     (tmp_path / "short").mkdir()
     authority = Authority(tmp_path / "short", days=doctor.LEAST_DAYS)
     authority.sign(Owner("daemon", ("127.0.0.1",), Role.OPERATOR))
@@ -186,11 +186,11 @@ def test_doctor_watches_the_certificates(site: Site, tmp_path: Path) -> None:
     tls = file.supervisory.tls.model_copy(update=short)
     changed = file.model_copy(update={"supervisory": file.supervisory.model_copy(update={"tls": tls})})
     with pytest.raises(doctor.FailedCheck, match=r"daemon\.pem or its authority's ends on 20"):
-        doctor._certificates(changed, tmp_path)
+        doctor.check_certificates(changed, tmp_path)
     gone = tls.model_copy(update={"key": tmp_path / "gone.key"})
     changed = file.model_copy(update={"supervisory": file.supervisory.model_copy(update={"tls": gone})})
     with pytest.raises(doctor.FailedCheck, match=r"gone\.key: cannot be read"):
-        doctor._certificates(changed, tmp_path)
+        doctor.check_certificates(changed, tmp_path)
 
 
 def test_certificates_are_never_written_over_and_bad_input_is_one_line(

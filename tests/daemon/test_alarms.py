@@ -219,14 +219,14 @@ def test_a_test_is_due_since_the_last_one_played_here_or_kept_by_a_command_of_it
 
 
 def test_the_dcs_reads_acknowledges_and_shelves(tmp_path: Path) -> None:
-    panel = Panel(LAW)
+    panel = Panel(LAW, travel_limit_strokes=0.1)
     stored = StoredHealth.in_folder(tmp_path, "FV-1", {})
     keeper = HealthKeeper(panel.health, lambda: panel.cycle.snapshot, "FV-1", stored, alarms=panel.alarms)
     panel.set("mode", Mode.AUTOMATIC)
     panel.run(0.01)
     bit = float(1 << (Ne107Cause.TRAVEL - 1))
-    panel.health._travel.travel_m = 1e6
-    object.__setattr__(panel.health, "settings", HealthSettings.of(HealthTable(travel_limit_strokes=10.0), 0.1016))
+    panel.set("reference", 0.8)
+    panel.run(0.5)
     keeper.check()
     assert (panel.get("alarms_active"), panel.get("alarms_unacknowledged")) == (bit, bit)
     panel.set("alarm_acknowledge", Ne107Cause.TRAVEL)

@@ -1,8 +1,8 @@
 """An experiment that whoever plays it breaks off: a veto ends it, whatever became of the connection."""
 
 from collections.abc import Callable, Iterator
-from socket import socket
 from threading import Event, Thread
+from typing import Any
 
 import pytest
 
@@ -50,15 +50,21 @@ def site() -> Iterator[Site]:
 def played_until(site: Site, monkeypatch: pytest.MonkeyPatch, happens: Callable[[], None]) -> BaseException:
     """Play; under way, `happens` comes before one reply is waited for. Return what ended it."""
     with Dcs("127.0.0.1", site.server.port) as dcs:
-        wait = dcs._client._reply
-        left = [happens]
+        line, left = dcs.client.line, [happens]
 
-        def reply(line: socket) -> bytes:
-            if left and site.panel.get("experiment_state") == ExperimentState.UNDER_WAY:
-                left.pop()()
-            return wait(line)
+        class Watched:
+            """The line to the daemon."""
 
-        monkeypatch.setattr(dcs._client, "_reply", reply)
+            def __getattr__(self, name: str) -> Any:
+                return getattr(line, name)
+
+            def recv(self, most: int) -> bytes:
+                if left and site.panel.get("experiment_state") == ExperimentState.UNDER_WAY:
+                    left.pop()()
+                assert line is not None
+                return line.recv(most)
+
+        monkeypatch.setattr(dcs.client, "line", Watched())
         with pytest.raises((KeyboardInterrupt, DcsError)) as ended:
             dcs.play(LONG, 5.0)
     return ended.value

@@ -31,7 +31,7 @@ def test_a_fault_that_is_not_seen_is_told(monkeypatch: pytest.MonkeyPatch) -> No
     (case,) = (each for each in CASES if str(each) == "modbus, manual, vent: another master writes")
     assert run_case(case).violations == []
     monkeypatch.setattr(Limits, "action_on", lambda *_: "hold")
-    monkeypatch.setattr("positioner.daemon.link.Link._overwritten_pa", lambda _: None)
+    monkeypatch.setattr("positioner.daemon.link.Link.overwritten_pa", lambda _: None)
     (said,) = run_case(case).violations
     assert said == "ended in NONE after 130 cycles"
     tolerated = replace(case, fault=replace(case.fault, ends_in=NONE))

@@ -366,10 +366,9 @@ def test_a_device_that_is_back_has_its_next_lost_reply_asked_for_again_at_once(
 ) -> None:
     """However long it was away: one lost reply is no fault."""
     clock = Stopwatch(monkeypatch)
-    driver = Scripted(*(NoReply("away") for _ in range(200)))
+    driver = Scripted(reading(1), *(NoReply("away") for _ in range(200)))
+    link = opened(driver)
     driver.shown = NoReply("away")
-    link = Link(driver, DevicePace())
-    link._connected = True
     for _ in range(5_000):
         link.exchange(5e4)
         clock.now_s += 1e-3

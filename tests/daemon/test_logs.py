@@ -5,6 +5,7 @@ import json
 import logging
 import math
 import sys
+import threading
 import time
 from threading import Event
 
@@ -46,15 +47,15 @@ def test_a_log_that_nobody_reads_is_bounded_and_says_what_it_lost(monkeypatch: p
     monkeypatch.setattr(logs, "FLUSH_S", 0.2)
     pipe = Pipe()
     monkeypatch.setattr(sys, "stderr", pipe)
+    before = set(threading.enumerate())
     listener = start_logging("info")
+    (thread,) = set(threading.enumerate()) - before
     for number in range(10_000):
         log_event(log, logging.INFO, "write refused", number=number)
     start_s = time.monotonic()
-    thread = listener._thread
     listener.stop()
     assert time.monotonic() - start_s < 30.0, "it does not wait for a reader that stopped"
     pipe.read_on.set()
-    assert thread is not None
     thread.join(30.0)
     listener.start()
     log_event(log, logging.INFO, "on")

@@ -215,14 +215,14 @@ def compressing(folder: Path, rows: int, keep_files: int = 10) -> None:
     recorder = Recorder(folder, "v", 4_000, keep_files, compress=True)
     recorder.start()
     fill(recorder, 0, rows)
-    compression = recorder._compression
+    compression = recorder.compression
     assert compression is not None
     while plain := [path for path in files_of(folder, "v")[:-2] if path.suffix == ".csv"]:
         compression.begin(plain)  # as the next rotation does
-        assert compression._process is not None
-        compression._process.wait(60)
-    if compression._process is not None:
-        compression._process.wait(60)  # its last file may be there as both still
+        assert compression.process is not None
+        compression.process.wait(60)
+    if compression.process is not None:
+        compression.process.wait(60)  # its last file may be there as both still
     recorder.stop()
 
 
@@ -265,7 +265,7 @@ def test_a_compression_that_fails_leaves_the_plain_file(
     content = path.read_bytes()
     with monkeypatch.context() as broken:
         if failing == "read back":
-            broken.setattr(recording_compression, "_same", lambda *_: False)
+            broken.setattr(recording_compression, "reads_back", lambda *_: False)
         if failing == "rename":
             broken.setattr(Path, "replace", fail_with(errno.EIO))
         with (

@@ -134,7 +134,7 @@ def test_it_is_started_ever_more_seldom(monkeypatch: pytest.MonkeyPatch) -> None
     monkeypatch.setattr(room, "time", SimpleNamespace(monotonic=lambda: 0.0))
     waits = []
     for _ in range(12):
-        process._give_up("it ended")
+        process.give_up("it ended")
         waits.append(process.again_s)
     assert waits[:4] == [1.0, 2.0, 4.0, 8.0]
     assert waits[-1] == room.LONGEST_S

@@ -215,7 +215,7 @@ def test_a_latched_fault_keeps_the_mode_until_acknowledged(panel: Panel, monkeyp
     panel.set("mode", 2)
     panel.run()
     with monkeypatch.context() as cable:
-        cable.setattr(panel.cycle.link, "_driver", Unplugged())
+        cable.setattr(panel.cycle.link, "driver", Unplugged())
         panel.run(3)
         assert (panel.get("fault"), panel.get("mode"), panel.get("quality")) == (Fault.NO_REPLY, 0, 2)
         assert panel.get("lost_replies") == 3
@@ -251,9 +251,9 @@ def test_the_age_is_worked_out_when_it_is_read_and_what_is_old_is_not_good(
 ) -> None:
     """Of a cycle that stands still."""
     panel.run()
-    monkeypatch.setattr(panel.cycle.link, "_longest_unattended_s", 1.0)
+    monkeypatch.setattr(panel.cycle.link, "longest_unattended_s", 1.0)
     for stands_s, quality, fault in ((0.5, Quality.GOOD, Fault.NONE), (2.5, Quality.LOST, Fault.STALLED)):
-        monkeypatch.setattr(panel.cycle._pace, "since_s", lambda _now_s, stands_s=stands_s: stands_s)
+        monkeypatch.setattr(panel.cycle.pace, "since_s", lambda _now_s, stands_s=stands_s: stands_s)
         assert panel.get("sample_age") == pytest.approx(stands_s)
         assert (panel.get("quality"), panel.get("fault")) == (quality, fault)
         assert (panel.get("ne107") == Ne107Status.FAILURE) == (fault is Fault.STALLED)
@@ -282,8 +282,8 @@ def test_a_dcs_identifies_though_somebody_left_the_switches_on(panel: Panel, mon
         panel.run()
     assert (panel.get("state"), panel.get("why")) == (0, InhibitReason.EXCITATION_FROM_BEFORE)
     client = dcs.Dcs("127.0.0.1", 1)
-    monkeypatch.setattr(client, "_client", Registers(panel))
-    monkeypatch.setattr(client, "_decided_since", lambda _: True)
+    monkeypatch.setattr(client, "client", Registers(panel))
+    monkeypatch.setattr(client, "decided_since", lambda _: True)
     seen: list[float] = []
     client.identify({"alpha": 60e3, "beta": 13e3}, 5.0, seen.append)
     assert seen[-1] == 1.0, "it was excited to the end"

@@ -152,7 +152,7 @@ def test_one_whose_cycles_stand_is_killed_and_started_again(
     with ExitStack() as on_exit:
         here = Workers(shared[1], RequestCounts(), told.append, on_exit)
         here.begin()
-        first, second = here._workers
+        first, second = here.workers
 
         def look(holds: Callable[[], bool]) -> Callable[[], bool]:
             def looked() -> bool:
@@ -162,7 +162,7 @@ def test_one_whose_cycles_stand_is_killed_and_started_again(
             return looked
 
         until(look(lambda: first.turns > 0 and second.turns > 0), "turns")
-        pid = first._process.pid if first._process else 0
+        pid = first.process.pid if first.process else 0
         os.kill(pid, signal.SIGSTOP)
         caplog.clear()
         assert [position_m(here, 1), position_m(here, 1)] == [None, None], "no answer in time is exception 11"
@@ -171,14 +171,14 @@ def test_one_whose_cycles_stand_is_killed_and_started_again(
         assert position_m(here, 1) is None
         assert position_m(here, 2) is not None, "the other answers"
         until(look(lambda: position_m(here, 1) is not None), "its return")
-        assert first._process is not None
+        assert first.process is not None
         monkeypatch.setattr(workers, "FIRST_S", 0.0)
         with monkeypatch.context() as full:
             full.setattr(tempfile, "TemporaryFile", Path(__file__, "no room").open)
-            os.kill(first._process.pid, signal.SIGKILL)
-            until(look(lambda: first._failures > 3), "starts that fail")
+            os.kill(first.process.pid, signal.SIGKILL)
+            until(look(lambda: first.failures > 3), "starts that fail")
         until(look(lambda: position_m(here, 1) is not None), "its return once there is room")
-        assert second._failures == 0
+        assert second.failures == 0
 
 
 def test_without_the_daemon_they_end_as_they_are_told_to(tmp_path: Path) -> None:

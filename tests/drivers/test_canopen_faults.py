@@ -63,9 +63,9 @@ class Scripted(NodeServer):
         }
         super().__init__(CanBus(channel=channel, node=NODE), self.device, clocks[clock](), "test")
 
-    def _send(self, identity: int, data: bytes) -> None:
+    def send(self, identity: int, data: bytes) -> None:
         for each in self.fault(identity, data):
-            super()._send(*each)
+            super().send(*each)
 
 
 def config(channel: str, **more: object) -> CanopenDevice:
@@ -163,7 +163,7 @@ def test_a_node_that_talks_of_all_else_does_not_keep_the_driver_beyond_its_time_
 
     for each in (pdo, watcher):
         monkeypatch.setattr(each, "time", Clock)
-    monkeypatch.setattr(driver._bus, "receive", babble)
+    monkeypatch.setattr(driver.bus, "receive", babble)
     start_s = now_s[0]
     fails(NoReply, NodeEvent.SYNC_LOST, driver.pdos.sample)
     assert now_s[0] - start_s == pytest.approx(PATIENT_S, abs=2e-3)
@@ -269,7 +269,7 @@ def test_what_another_master_is_told_of_the_same_object_does_not_confirm_a_write
 ) -> None:
     """The answer to its read names the object that is written, and is of another kind."""
     driver.open()
-    entry = driver._config.map.command_pa
+    entry = config("any").map.command_pa
     read = b"\x43" + struct.pack("<HB", entry.index, entry.subindex) + struct.pack("<f", 99e3)
 
     def told_too(identity: int, data: bytes) -> list[tuple[int, bytes]]:
@@ -326,9 +326,8 @@ def test_two_nodes_of_one_id_are_told_and_one_is_enough(
     with pytest.raises(InputError, match=r"bus\.node: 5 is taken by another node"):
         twin.start()
     forced = Scripted(channel)
-    forced.node.boot()  # without listening first
+    forced.begin()  # without listening first
     forced.node.receive(0, bytes((1, NODE)))
-    forced._thread.start()
     with pytest.raises(DriverError):  # its boot-up, then twice the TPDOs
         _ = [driver.exchange(PUSH_PA) for _ in range(10)]
 
@@ -448,7 +447,7 @@ def test_a_node_operated_locally_that_is_found_so_is_left_where_it_is(
     in_time(lambda: node.node.machine.mode == 2)
     local_pa = PUSH_PA / 2
     assert SIMULATED_OBJECTS.pressure_pa is not None
-    node.node._reads[SIMULATED_OBJECTS.pressure_pa.index] = lambda: local_pa
+    node.node.reads[SIMULATED_OBJECTS.pressure_pa.index] = lambda: local_pa
     assert driver.open() == local_pa
     assert driver.exchange(local_pa).status == DeviceStatus.NOT_READY
     third.send(frame(0x600 + NODE, b"\x2f\x42\x60\x00\x01\0\0\0"))
@@ -488,7 +487,7 @@ def test_a_fault_of_the_node_is_reset_by_open(driver: CanopenDriver, node: Scrip
 
 
 def test_a_status_word_that_is_no_state_is_no_actuator(driver: CanopenDriver, node: Scripted) -> None:
-    node.node._reads[STATUS_WORD] = lambda: 0b0000
+    node.node.reads[STATUS_WORD] = lambda: 0b0000
     assert driver.exchange(PUSH_PA).status == DeviceStatus.NOT_READY
 
 

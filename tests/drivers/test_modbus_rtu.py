@@ -122,7 +122,7 @@ class ScriptedDevice:
 
 def decided_by(device: ScriptedDevice, driver: ModbusRtuDriver) -> ModbusRtuDriver:
     """Return the driver; its time-outs pass when the device has met each request, with an answer or without."""
-    line = driver._line
+    line = driver.line
     send, receive = line.send, line.receive
 
     def asking(frame: bytes, within_s: float) -> float:
@@ -259,7 +259,7 @@ def test_a_number_that_is_none_is_no_measurement_but_the_line_stays(
 
 
 def test_noise_on_the_idle_line_is_thrown_away(driver: ModbusRtuDriver, scripted: ScriptedDevice) -> None:
-    fd = os.open(driver._line._port.path, os.O_RDONLY | os.O_NOCTTY)
+    fd = os.open(driver.line.port.path, os.O_RDONLY | os.O_NOCTTY)
     for noise in (b"\0", b"\xff\xff", framed(1, b"\x10\0\x0b\0\2")):
         scripted.line.send(noise, 1.0)
         assert select.select((fd,), (), (), 5) == ([fd], [], []), "it has arrived"
@@ -271,7 +271,7 @@ def test_a_line_that_is_never_silent_is_no_connection(slow_driver: ModbusRtuDriv
     stop = threading.Event()
 
     def babble() -> None:
-        fd = os.open(scripted.line._port.path, os.O_WRONLY | os.O_NOCTTY)
+        fd = os.open(scripted.line.port.path, os.O_WRONLY | os.O_NOCTTY)
         while not stop.wait(1e-3):
             os.write(fd, b"\x55")
         os.close(fd)

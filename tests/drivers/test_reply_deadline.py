@@ -7,6 +7,7 @@ import socket
 import struct
 import threading
 from collections.abc import Callable, Iterator
+from typing import Any
 
 import pytest
 
@@ -23,7 +24,7 @@ from drivers.modbus_tcp import ModbusTcpDriver
 from fieldbus.modbus import client as modbus_client
 from fieldbus.modbus.client import ModbusClient
 from fieldbus.modbus.client_errors import NotConnected, ReplyTimeout
-from fieldbus.modbus.connection import Connection, endpoint
+from fieldbus.modbus.connection import Connection
 from fieldbus.modbus.rtu import framed
 from fieldbus.modbus.server import RegisterServer
 from fieldbus.modbus.tls import Guard
@@ -83,9 +84,9 @@ class Dribbling:
         return data
 
 
-@pytest.fixture(params=["tcp", "tls"])
-def client(request: pytest.FixtureRequest) -> ModbusClient:
-    return ModbusClient("127.0.0.1", 1, 1, TIMEOUT_S, tls("daemon") if request.param == "tls" else None)
+@pytest.fixture
+def client() -> ModbusClient:
+    return ModbusClient("127.0.0.1", 1, 1, TIMEOUT_S)
 
 
 @pytest.mark.parametrize("gap_s", [TIMEOUT_S / 30, TIMEOUT_S / 4, TIMEOUT_S])
@@ -95,7 +96,7 @@ def test_a_reply_that_dribbles_is_given_up_when_the_time_out_of_the_first_byte_w
     clock = Clock()
     monkeypatch.setattr(modbus_client, "time", clock)
     line = Dribbling(clock, gap_s)
-    client._socket = line  # type: ignore[assignment]
+    client.line = line  # type: ignore[assignment]
     start_s = clock.now_s
     with pytest.raises(ReplyTimeout, match="no reply within 200 ms"):
         client.transact(READ_11)
@@ -111,7 +112,7 @@ def test_a_reply_in_pieces_that_is_whole_in_time_counts_and_the_next_has_all_of_
     clock = Clock()
     monkeypatch.setattr(modbus_client, "time", clock)
     line = Dribbling(clock, TIMEOUT_S / 32)
-    client._socket = line  # type: ignore[assignment]
+    client.line = line  # type: ignore[assignment]
     for _ in range(3):
         assert client.transact(READ_11) == REPLY
     assert line.sent_with_s == [TIMEOUT_S] * 3
@@ -142,7 +143,7 @@ def test_on_a_serial_line_somebody_who_never_stops_keeps_nobody(monkeypatch: pyt
     clock = Clock()
     monkeypatch.setattr(modbus_rtu, "time", clock)
     driver = ModbusRtuDriver(ModbusRtuDevice(serial=SerialPort(path="/dev/ttyS9"), reply_timeout_s=TIMEOUT_S))
-    driver._line = Babbler(clock)  # type: ignore[assignment]
+    driver.line = Babbler(clock)  # type: ignore[assignment]
     with pytest.raises(NoConnection, match="nobody answers within 200 ms"):
         driver.open()
     assert clock.now_s - 50.0 <= 1.2 * TIMEOUT_S
@@ -185,18 +186,29 @@ def test_a_device_that_dribbles_on_tcp_is_no_reply(
     server = RegisterServer(DeviceRegisters(device, Lockstep(device)), "127.0.0.1", 0, 1, guard)
     server.start()
     driver = ModbusTcpDriver(ModbusTcpDevice(port=server.port, reply_timeout_s=TIMEOUT_S, tls=table))
+
+    honest, slow = Connection.handle, list[bool]()
+
+    class Line:
+        def __init__(self, line: socket.socket) -> None:
+            self._line = line
+
+        def __getattr__(self, name: str) -> Any:
+            return getattr(self._line, name)
+
+        def sendall(self, data: bytes) -> None:
+            if slow:
+                bytewise.dribble(self._line.sendall, data)
+            else:
+                self._line.sendall(data)
+
+    def handle(connection: Connection) -> None:
+        connection.request = Line(connection.request)  # type: ignore[assignment]
+        honest(connection)
+
+    monkeypatch.setattr(Connection, "handle", handle)
     driver.open()
-
-    def slowly(connection: Connection) -> None:
-        line: socket.socket = connection.request
-        for transaction, unit, pdu in connection._requests():
-            answer = connection.server.answer(unit, pdu, endpoint(connection.client_address))
-            frame = struct.pack(">HHHB", transaction, 0, len(answer) + 1, unit) + answer
-            bytewise.dribble(line.sendall, frame)
-
-    driver.close()
-    monkeypatch.setattr(Connection, "handle", slowly)
-    driver._client.open()
+    slow.append(True)
     with pytest.raises(NoReply, match="no reply within 200 ms"):
         driver.exchange(PUSH_PA)
     assert bytewise.sent < 31

@@ -309,9 +309,9 @@ def test_a_role_that_is_not_known_to_the_letter_is_none(text: bytes) -> None:
     from cryptography import x509
     from cryptography.hazmat.primitives import serialization
 
-    from fieldbus.modbus.client_roles import ROLE_OID, _role
+    from fieldbus.modbus.client_roles import ROLE_OID, role_in
 
-    assert _role(b"\x0c" + bytes((len(text),)) + text) is Role.NONE
+    assert role_in(b"\x0c" + bytes((len(text),)) + text) is Role.NONE
     parsed = x509.load_pem_x509_certificate((folder() / "engineer.pem").read_bytes())
     value = parsed.extensions.get_extension_for_oid(x509.ObjectIdentifier(ROLE_OID)).value
     assert value == x509.UnrecognizedExtension(x509.ObjectIdentifier(ROLE_OID), b"\x0c\x08engineer")

@@ -99,7 +99,7 @@ def test_what_cannot_be_is_refused_with_its_reason(found: list[SlideOutcome], re
 def identified(found: list[SlideOutcome]) -> StaticIdentification:
     statics = StaticIdentification(STROKE_M)
     for each in found:
-        statics._take(each)
+        statics.take(each)
     return statics
 
 

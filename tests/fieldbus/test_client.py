@@ -131,11 +131,11 @@ def test_opening_anew_ends_the_connection_before() -> None:
         client = ModbusClient("127.0.0.1", listener.getsockname()[1], UNIT, TIMEOUT_S)
         client.open()
         first, _ = listener.accept()
-        held = client._socket  # or it would end for want of an owner
+        held = client.line  # or it would end for want of an owner
         client.open()
         first.settimeout(TIMEOUT_S)
         assert first.recv(1) == b""
-        assert held is not client._socket
+        assert held is not client.line
         client.close()
         first.close()
 

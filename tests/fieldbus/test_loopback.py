@@ -5,7 +5,7 @@ import subprocess
 import sys
 import time
 from collections.abc import Callable, Iterator
-from threading import Event, Thread
+from threading import Event, Thread, current_thread
 from typing import Any
 
 import can
@@ -96,14 +96,15 @@ def test_a_frame_sent_while_a_reader_has_a_hello_in_hand_goes_to_the_newcomer(
     join: Join, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     end = join()
-    in_hand, go_on, newcomer_at = Event(), Event(), end._newcomer
+    in_hand, go_on, peer_at = Event(), Event(), can_bus.Peer
 
     def slowly(port: int) -> Any:
-        in_hand.set()
-        assert go_on.wait(10)
-        return newcomer_at(port)
+        if current_thread() is reader:
+            in_hand.set()
+            assert go_on.wait(10)
+        return peer_at(port)
 
-    monkeypatch.setattr(end, "_newcomer", slowly)
+    monkeypatch.setattr(can_bus, "Peer", slowly)
     monkeypatch.setattr(can_bus, "BUS_LOOK_S", 0.0)
     reader = Thread(target=end.recv, args=(0.5,))
     reader.start()
@@ -192,7 +193,7 @@ def test_garbage_strangers_and_torn_datagrams_are_dropped(join: Join) -> None:
         b"pCAN\x01\x01" + bytes(40),
         b"pCAN\x00\x01" + bytes(8) + b"abc",
     ):
-        second._socket.sendto(torn, (HOST, first.port))
+        second.socket.sendto(torn, (HOST, first.port))
     second.send(frame(7))
     assert received(first, 1) == [7]
     assert received_now(first) == []
@@ -203,18 +204,18 @@ def test_who_is_not_an_end_can_say_nothing_for_one(join: Join) -> None:
     first, second = join(), join()
     second.send(frame(1))
     assert received(first, 1) == [1]
-    before = dict(first._peers)
+    before = dict(first.peers)
     peer = before[second.port]
     state = (peer.sent, peer.acked, peer.received, peer.filters)
-    forged = [can_bus.FRAME.pack(MAGIC, can_bus.DATA, end, 2, 0, 0x205) + bytes(8) for end in (second._end, 5)]
-    forged += [can_bus.HEAD.pack(MAGIC, kind, second._end, 9, 0) for kind in (can_bus.HELLO, can_bus.ACK, can_bus.BYE)]
+    forged = [can_bus.FRAME.pack(MAGIC, can_bus.DATA, end, 2, 0, 0x205) + bytes(8) for end in (second.end, 5)]
+    forged += [can_bus.HEAD.pack(MAGIC, kind, second.end, 9, 0) for kind in (can_bus.HELLO, can_bus.ACK, can_bus.BYE)]
     for host, port in ((HOST, 0), ("127.0.0.2", second.port)):
         with socket.socket(socket.AF_INET, socket.SOCK_DGRAM) as stranger:
             stranger.bind((host, port))
             for datagram in forged:
                 stranger.sendto(datagram, (HOST, first.port))
     assert received_now(first) == []
-    assert first._peers == before
+    assert first.peers == before
     assert (peer.sent, peer.acked, peer.received, peer.filters) == state
     second.send(frame(7))
     assert received(first, 1) == [7]
@@ -222,7 +223,7 @@ def test_who_is_not_an_end_can_say_nothing_for_one(join: Join) -> None:
 
 
 def test_it_is_on_the_loopback_only(join: Join) -> None:
-    assert join()._socket.getsockname()[0] == "127.0.0.1"
+    assert join().socket.getsockname()[0] == "127.0.0.1"
 
 
 def test_one_that_does_not_read_holds_up_nobody_and_knows_what_it_missed(join: Join) -> None:
@@ -245,12 +246,12 @@ def test_one_that_does_not_read_holds_up_nobody_and_knows_what_it_missed(join: J
 
 def test_one_killed_without_goodbye_is_forgotten(join: Join) -> None:
     sender, killed = join(), join()
-    assert killed._peers  # the system closes the socket of a killed process
-    killed._socket.close()
+    assert killed.peers  # the system closes the socket of a killed process
+    killed.socket.close()
     start_s = time.monotonic()
     for n in range(4 * WINDOW):
         sender.send(frame(n))
-    assert killed.port not in sender._peers
+    assert killed.port not in sender.peers
     assert time.monotonic() - start_s < 1.0
 
 
@@ -258,7 +259,7 @@ def test_one_killed_and_back_before_anybody_noticed_begins_anew(join: Join) -> N
     sender, killed = join(), join()
     for n in range(20):
         sender.send(frame(n))
-    killed._socket.close()
+    killed.socket.close()
     again = join()
     assert again.port == killed.port
     again.send(frame(1))
@@ -275,7 +276,7 @@ def test_what_an_end_does_not_want_is_not_even_sent(join: Join) -> None:
     for identity in (0x80, 0x185, 0x200, 0x186):
         sender.send(frame(identity))
     assert received(picky, 2) == [0x185, 0x186]
-    assert sender._peers[picky.port].sent == 2
+    assert sender.peers[picky.port].sent == 2
     picky.set_filters(None)
     sender.recv(0.0)  # it looks at least once a millisecond
     sender.send(frame(0x80))

@@ -1,7 +1,7 @@
 """What comes over a bus: requests and replies on Modbus, frames on CANopen, datagrams of the loopback bus."""
 
 from collections.abc import Callable
-from functools import cache
+from functools import cache, partial
 from types import SimpleNamespace
 from unittest import mock
 
@@ -21,11 +21,10 @@ from fieldbus.canopen import loopback
 from fieldbus.canopen.eds import read_eds
 from fieldbus.modbus.client import ModbusClient
 from fieldbus.modbus.client_errors import ClientError
-from fieldbus.modbus.client_roles import Identity, NotAuthorized
+from fieldbus.modbus.client_roles import Identity, NotAuthorized, authorize
 from fieldbus.modbus.connection import HEADER, Connection
 from fieldbus.modbus.register_answers import RegisterAnswers
 from fieldbus.modbus.rtu import framed, is_whole
-from fieldbus.modbus.tls import Guard
 from sim.slave.canopen_node import CanopenNode
 from sim.slave.clocks import Lockstep
 from sim.slave.device_registers import DeviceRegisters
@@ -63,11 +62,13 @@ def registers_of(answers: RegisterAnswers) -> Callable[[bytes], None]:
 
 def roles(data: bytes) -> None:
     """Ask what a request needs, as each role."""
-    guard = object.__new__(Guard)
-    guard._writers = lambda at: WRITER_AT.get(at, Role.OBSERVER)
+
+    def writer(at: int) -> Role:
+        return WRITER_AT.get(at, Role.OBSERVER)
+
     for role in (Role.OBSERVER, Role.OPERATOR):
         if data:
-            refused_in_one_line(lambda role=role: guard.authorize(Identity("x", role), data), NotAuthorized)  # type: ignore[misc]
+            refused_in_one_line(partial(authorize, Identity("x", role), data, writer), NotAuthorized)
 
 
 class _Sender:
@@ -107,7 +108,7 @@ def replies_at_the_client(answers: RegisterAnswers) -> Callable[[bytes], None]:
 
     def parse(data: bytes) -> None:
         client = ModbusClient("fuzz", 502, 1, 0.01)
-        client._socket = SpoiltSocket(answers, Bytes(data))  # type: ignore[assignment]
+        client.line = SpoiltSocket(answers, Bytes(data))  # type: ignore[assignment]
         for _ in range(3):
             refused_in_one_line(lambda: client.read_holding_registers(0, 4), ClientError)
             refused_in_one_line(lambda: client.write_registers(0, [1, 2]), ClientError)
@@ -117,20 +118,18 @@ def replies_at_the_client(answers: RegisterAnswers) -> Callable[[bytes], None]:
 
 def frames_at_the_rtu_server(data: bytes) -> None:
     """Serve a frame, and the same with the right check sum."""
-    server = object.__new__(RtuServer)
-    RegisterAnswers.__init__(server, _ANSWERS._registers)
-    server._unit, server.address, server._silence_s = 1, "fuzz", 0.0
-    server._line = HeardLine()  # type: ignore[assignment]
+    server = RtuServer(_ANSWERS.registers, _RTU.serial, 1)
+    server.line = HeardLine()  # type: ignore[assignment]
     is_whole(data)
-    server._serve(data)
+    server.serve(data)
     if 1 < len(data) < 254:
-        server._serve(framed(data[0], data[1:]))
+        server.serve(framed(data[0], data[1:]))
 
 
 def replies_at_the_rtu_driver(data: bytes) -> None:
     """Open and exchange while a device's replies are spoilt."""
     driver = ModbusRtuDriver(_RTU)
-    driver._line = SpoiltLine(_ANSWERS, Bytes(data))  # type: ignore[assignment]
+    driver.line = SpoiltLine(_ANSWERS, Bytes(data))  # type: ignore[assignment]
     refused_in_one_line(driver.open, DriverError)
     for _ in range(3):
         refused_in_one_line(lambda: driver.exchange(HELD_PA), DriverError)
@@ -187,8 +186,8 @@ def _ends() -> tuple[loopback.LoopbackBus, loopback.LoopbackBus]:
 def datagrams_of_the_loopback(data: bytes) -> None:
     """Send what is no datagram, or looks like one, from an end's own socket."""
     taking, sending = _ends()
-    for datagram in (data, loopback.MAGIC + data[:1] + bytes((sending._end,)) + data[1:]):
-        sending._socket.sendto(datagram[:1400], (loopback.HOST, taking.port))
+    for datagram in (data, loopback.MAGIC + data[:1] + bytes((sending.end,)) + data[1:]):
+        sending.socket.sendto(datagram[:1400], (loopback.HOST, taking.port))
         while taking.recv(0.0) is not None:
             pass
     while sending.recv(0.0) is not None:

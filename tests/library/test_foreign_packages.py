@@ -110,7 +110,7 @@ def test_doctor_names_a_distribution_that_installed_over_ours(
     (metadata / "METADATA").write_text("Metadata-Version: 2.1\nName: settings-for-all\nVersion: 1.0\n")
     (metadata / "top_level.txt").write_text("config\n")
     monkeypatch.syspath_prepend(tmp_path)
-    assert not doctor._passes("packages", "", doctor._packages)
+    assert not doctor.passes("packages", "", doctor.check_packages)
     line = capsys.readouterr().out
     assert line.startswith("packages     FAILS settings-for-all has installed its own config among positioner's: start")
     assert line.count("\n") == 1

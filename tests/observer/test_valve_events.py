@@ -7,7 +7,7 @@ from northbound.observer.valve_events import (
     AS_SERVED,
     FROM_HISTORY,
     SeenEvent,
-    _put_in_words,
+    put_in_words,
     read_event,
     what_happened,
 )
@@ -66,9 +66,9 @@ def test_what_its_class_is_is_told_with_its_cause_and_once() -> None:
     assert ended is not None
     assert told(None, ended) == [("the excitation has ended", "")]
     health = Event("FV-101", 5, 1e9, EventKind.HEALTH, "HEALTH", Ne107Status.FUNCTION_CHECK, 1, "not automatic")
-    assert _put_in_words(health).text == "NE 107: C check, not automatic"
+    assert put_in_words(health).text == "NE 107: C check, not automatic"
     good = Event("FV-101", 6, 1e9, EventKind.HEALTH, "HEALTH", Ne107Status.GOOD, 0, "")
-    assert (_put_in_words(good).text, _put_in_words(good).ne107) == ("NE 107: good", "")
+    assert (put_in_words(good).text, put_in_words(good).ne107) == ("NE 107: good", "")
 
 
 def test_events_that_came_between_two_readings_are_counted() -> None:

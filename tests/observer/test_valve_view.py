@@ -149,8 +149,10 @@ def test_a_trend_keeps_the_newest() -> None:
 
 
 def test_ten_minutes_are_kept() -> None:
-    view = ValveView("valve", STROKE_M, POLL_S)
-    assert len(view._trend._rows) == round(TREND_S / POLL_S) == 12_000
+    view = ValveView("valve", STROKE_M, TREND_S / 5)
+    for number in range(8):
+        view.lose(number * TREND_S / 5, "away")
+    assert view.trend(-1.0)["time_s"].tolist() == [number * TREND_S / 5 for number in range(3, 8)]
 
 
 def test_bands_end_where_the_next_begins_and_a_gap_is_none() -> None:

@@ -107,7 +107,7 @@ def test_an_export_is_held_out_as_the_first_was_read(tmp_path: Path) -> None:
 def test_a_kept_curve_stays_when_the_valve_gets_better_and_goes_with_another_recording(desk: Desk) -> None:
     desk.keep_variant()
     kept_m = desk.variants[SAVED]
-    desk._go_on(valve(), {})
+    desk.go_on(valve(), {})
     assert desk.variants[SAVED] is kept_m
     desk.take_recording(other())
     assert SAVED not in desk.variants
@@ -199,7 +199,7 @@ def test_the_race_and_the_errors_are_in_the_unit_that_was_chosen(desk: Desk) -> 
     panel = cast(SearchPanel, SimpleNamespace(_desk=desk))
     for unit, error in {"mm": 2.54, "in": 0.1}.items():
         desk.units.position = unit
-        drawn = SearchPanel._draw(panel)
+        drawn = SearchPanel.draw(panel)
         assert drawn["data"][0]["x"] == pytest.approx([error])
         assert f"fitted error, {unit} rms" in str(drawn["layout"]["xaxis"])
         assert (desk.errors.shown(2.54e-3).text, desk.errors.unit) == (f"{error:g}", unit)

@@ -75,7 +75,7 @@ def test_what_a_search_comes_to_is_not_for_the_page_that_was_loaded_again(workbe
 
     async def looks() -> None:
         with Client(ui.page("/")):  # no browser shows it
-            await SearchPanel._look(cast(SearchPanel, SimpleNamespace(_desk=desk)))
+            await SearchPanel.look(cast(SearchPanel, SimpleNamespace(_desk=desk)))
 
     asyncio.run(looks())
     assert search.look(), "it is still there for the new page"

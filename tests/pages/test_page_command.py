@@ -16,7 +16,7 @@ VALVE = "[valve]\nname = '{name}'\nstroke_m = 0.1\n[supervisory]\nport = {port}\
 
 
 def places(*words: str) -> list[Place]:
-    return list(page._places(command_parser().parse_args(["page", *words])))
+    return list(page.daemon_places(command_parser().parse_args(["page", *words])))
 
 
 def daemon(path: Path, name: str, port: int) -> str:

@@ -17,7 +17,7 @@ from config.slave_file import DeviceFault, Initial
 from config.toml_text import with_values
 from config.travel import ActionWord
 from config.valve_file import EffectTable
-from positioner.cli.commission import _write_proposals
+from positioner.cli.commission import write_proposals
 from positioner.cli.main import main
 from positioner.cli.parts.own_valve import unknown_travel
 from positioner.control.played_experiment import ROUNDING
@@ -126,7 +126,7 @@ def test_a_greatest_pressure_is_written_where_nobody_has(tmp_path: Path) -> None
     for text, expected in ((SITE, MAXIMUM_PA), (SITE.replace("maximum_pa", "minimum_pa = 0.0 #"), 116e3)):
         site = tmp_path / "site.toml"
         site.write_text(text.replace("[valve]", "[valve]\nstroke_m = 0.04"))
-        assert _write_proposals(site, load_daemon(site), proposed, Namespace(yes=True, name=None)) == 0
+        assert write_proposals(site, load_daemon(site), proposed, Namespace(yes=True, name=None)) == 0
         assert load_daemon(site).pressure.maximum_pa == expected
 
 

@@ -49,13 +49,13 @@ def test_a_recording_that_kills_its_workers_is_listed_and_a_scheduler_that_is_go
     from distributed import KilledWorker
 
     died: Any = KilledWorker
-    killed = engine._answer(Future("error", died("examine-1", None, 3)), set(), 1.0)
+    killed = engine.answer_of(Future("error", died("examine-1", None, 3)), set(), 1.0)
     assert killed.outcome == "unreadable"
     assert killed.sentence == "the workers that examined it died"
     for status in ("cancelled", "lost", "finished"):
-        with pytest.raises(CommandFailed, match="the same command goes on from there"), engine._tell_when_gone():
-            engine._answer(Future(status), set(), 1.0)
-    assert engine._answer(Future("cancelled"), {"examine-1"}, 9.0).sentence == "not examined within 9 s"
+        with pytest.raises(CommandFailed, match="the same command goes on from there"), engine.tell_when_gone():
+            engine.answer_of(Future(status), set(), 1.0)
+    assert engine.answer_of(Future("cancelled"), {"examine-1"}, 9.0).sentence == "not examined within 9 s"
 
 
 @pytest.mark.patient
@@ -69,7 +69,7 @@ def test_no_scheduler_is_one_line(
 
 
 def test_a_task_runs_since_those_before_it_at_its_worker_are_through() -> None:
-    clocks = engine._Clocks()
+    clocks = engine.TaskClocks()
     clocks.look({"here": ["first"], "there": ["other"]}, {"here": 1, "there": 1}, 0.0)
     clocks.look({"here": ["behind", "first"], "there": ["other"]}, {"here": 1, "there": 1}, 5.0)
     assert clocks.late(1.0) == [("here", "first"), ("there", "other")]

@@ -136,11 +136,11 @@ def work(client: Any, courses: Sequence[Course], time_limit_s: float = TIME_LIMI
                 under_way[future.key] = course, future
                 answers.add(future)
 
-    with _tell_when_gone(), _limit_time(client, time_limit_s, lambda key: under_way[key][1].cancel()) as overdue:
+    with tell_when_gone(), _limit_time(client, time_limit_s, lambda key: under_way[key][1].cancel()) as overdue:
         fill()
         for future in answers:
             course, _ = under_way.pop(future.key)
-            course.take(_answer(future, overdue, time_limit_s))
+            course.take(answer_of(future, overdue, time_limit_s))
             waiting.appendleft(course)
             fill()
 
@@ -148,7 +148,7 @@ def work(client: Any, courses: Sequence[Course], time_limit_s: float = TIME_LIMI
 @contextmanager
 def _limit_time(client: Any, time_limit_s: float, give_up: Callable[[str], None]) -> Iterator[set[str]]:
     """Give up what is under way for longer than a limit, on a thread of its own; gives the keys of what was."""
-    clocks, overdue, ended = _Clocks(), set[str](), Event()
+    clocks, overdue, ended = TaskClocks(), set[str](), Event()
 
     def look() -> None:
         clocks.look(client.processing(), client.nthreads(), time.monotonic())
@@ -173,7 +173,7 @@ def _limit_time(client: Any, time_limit_s: float, give_up: Callable[[str], None]
         thread.join(CONNECT_WITHIN_S)
 
 
-class _Clocks:
+class TaskClocks:
     """Since when each task runs: of those at a worker, as many as it has threads, those that came first."""
 
     def __init__(self) -> None:
@@ -197,7 +197,7 @@ class _Clocks:
 
 
 @contextmanager
-def _tell_when_gone() -> Iterator[None]:
+def tell_when_gone() -> Iterator[None]:
     """Say so in one line where the connection to the scheduler ends, at whatever it is asked.
 
     Raises:
@@ -209,7 +209,8 @@ def _tell_when_gone() -> Iterator[None]:
         raise CommandFailed(GONE) from None
 
 
-def _answer(future: Any, overdue: set[str], time_limit_s: float) -> Examination:
+def answer_of(future: Any, overdue: set[str], time_limit_s: float) -> Examination:
+    """Return what a task came to, or why there is no answer."""
     if future.status == "finished":
         found: Examination = future.result()
         return found

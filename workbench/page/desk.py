@@ -363,7 +363,7 @@ class Desk:
         path = self._path("better")
         write_extended(extension, search.begins.path, path)
         made = Extended(search.begins, extension, search.recording, search.held_out, went_on, search.form)
-        self._go_on(NamedValve(path.name, path, extension.valve, made), extension.extended.parameters)
+        self.go_on(NamedValve(path.name, path, extension.valve, made), extension.extended.parameters)
 
     def undo(self) -> bool:
         """Take back what was done last, a move of a slider or another recording or valve; whether there was anything.
@@ -428,7 +428,7 @@ class Desk:
         self.fitted, self.search, self.found = {}, None, None
         self.variants = {"as opened": live.curve().simulated_m} if live else {}
 
-    def _go_on(self, valve: NamedValve, fitted: Mapping[str, Fitted]) -> None:
+    def go_on(self, valve: NamedValve, fitted: Mapping[str, Fitted]) -> None:
         """Take a valve that was found here: the one before stays laid over it."""
         kept, before = (self.search, self.found), self._model().curve().simulated_m
         saved = {name: each for name, each in self.variants.items() if name == SAVED}

@@ -68,7 +68,7 @@ class SearchPanel:
         self._raced: tuple[int, int] = (0, 0)
         self._view: FigureView | None = None
         effect_section(desk, theme, self._update_names)
-        ui.timer(PANEL_LOOK_S, self._look)
+        ui.timer(PANEL_LOOK_S, self.look)
         self._show()
         self._show_race()
         if desk.found is not None:
@@ -128,7 +128,7 @@ class SearchPanel:
         self._desk.stop()
         self._show()
 
-    async def _look(self) -> None:
+    async def look(self) -> None:
         """Show what the search has told since."""
         search = self._desk.search
         if search is None or not is_looked_at() or not search.look():
@@ -180,11 +180,12 @@ class SearchPanel:
             self._race.clear()
             with self._race:
                 height_px = FRAME_PX + ROW_PX * len(search.race)
-                self._view = FigureView(self._theme, self._draw, height_px, "errors of the candidates")
+                self._view = FigureView(self._theme, self.draw, height_px, "errors of the candidates")
         else:
             self._view.redraw()
 
-    def _draw(self) -> Figure:
+    def draw(self) -> Figure:
+        """Return the race of the candidates, the best on top."""
         search, compared = self._desk.search, self._desk.compared
         race = {} if search is None else dict(sorted(search.race.items(), key=lambda each: -each[1]))
         of = self._desk.errors

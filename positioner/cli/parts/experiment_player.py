@@ -44,8 +44,8 @@ def require_ready(file: "DaemonFile", arguments: argparse.Namespace) -> None:
 
     if file.recorder is None:
         raise InputError(str(arguments.config), "recorder: is needed, for experiments are read from its recordings")
-    folder = _folder(file, arguments)
-    with _dcs(arguments) as dcs:
+    folder = recordings_of(file, arguments)
+    with daemon_of(arguments) as dcs:
         if not folder.is_dir():
             raise InputError(str(folder), "the recorder's folder is not there: run this on the daemon's machine")
         if dcs.get("mode") != Mode.AUTOMATIC:
@@ -80,28 +80,28 @@ class RunningValve:
     def __init__(self, file: "DaemonFile", arguments: argparse.Namespace) -> None:
         self._file = file
         self._arguments = arguments
-        self._folder = _folder(file, arguments)
+        self._folder = recordings_of(file, arguments)
 
     def command_pa(self) -> float:
         """Return the command in force, Pa, once the law has landed."""
-        with _dcs(self._arguments) as dcs:
+        with daemon_of(self._arguments) as dcs:
             wait_until_landed(dcs)
             return float(dcs.get("command"))
 
     def stem_m(self) -> float:
         """Return where the stem is, m, as recordings have it: more air, more of it."""
-        with _dcs(self._arguments) as dcs:
+        with daemon_of(self._arguments) as dcs:
             return self._file.valve.travel.stem_m(float(dcs.get("position")))
 
     def slope_pa_per_m(self) -> float | None:
         """Return the spring rate over the area that the law works with, Pa/m; None while it knows none."""
-        with _dcs(self._arguments) as dcs:
+        with daemon_of(self._arguments) as dcs:
             ratio = float(dcs.get("b_over_c_applied"))
         return -ratio if ratio < 0.0 else None
 
     def dead_band_pa(self) -> float | None:
         """Return twice the friction over the area that the law works with, Pa; None while it knows none."""
-        with _dcs(self._arguments) as dcs:
+        with daemon_of(self._arguments) as dcs:
             ratio = float(dcs.get("k_over_c_applied"))
         return -2.0 * ratio if ratio < 0.0 else None
 
@@ -111,7 +111,7 @@ class RunningValve:
 
         within_s = 2.0 * self._file.experiment.limit_s + RECORDED_WITHIN_S
         before = last_excited(self._folder, self._file.valve.name)
-        with _dcs(self._arguments) as dcs:
+        with daemon_of(self._arguments) as dcs:
             turn, band = (each / self._file.valve.stroke_m for each in (program.turn_m, program.band_m))
             state = dcs.play(program.points, within_s, turn=turn, band=band)
             problem = "" if state.played else why_not(state, dcs)
@@ -236,13 +236,15 @@ def _read(path: Path) -> Recording | None:
         raise
 
 
-def _folder(file: "DaemonFile", arguments: argparse.Namespace) -> Path:
+def recordings_of(file: "DaemonFile", arguments: argparse.Namespace) -> Path:
+    """Return the folder in which a daemon's recorder writes."""
     assert file.recorder is not None
     return Path(arguments.config).parent / file.recorder.folder
 
 
 @contextmanager
-def _dcs(arguments: argparse.Namespace) -> "Iterator[Dcs]":
+def daemon_of(arguments: argparse.Namespace) -> "Iterator[Dcs]":
+    """Connect to the daemon that a command line names."""
     where = {"config": arguments.config, "valve": arguments.name, "tls": arguments.tls}
     with connect_dcs(argparse.Namespace(host=None, port=None, unit=None, **where)) as dcs:
         yield dcs

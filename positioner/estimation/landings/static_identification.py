@@ -120,7 +120,7 @@ class StaticIdentification:
         if not outcome.moved and off_m > near_m:
             self.held = (outcome, *self.held[: self._each - 1])
         if outcome.landing:
-            self._take(outcome)
+            self.take(outcome)
         return outcome
 
     def _believed(self, supposed: Supposed) -> bool:
@@ -150,7 +150,8 @@ class StaticIdentification:
         self.way = outcome.direction if outcome.moved else self.way
         return outcome._replace(from_m=from_m, position_m=valve.stem_m(outcome.position_m, self.way))
 
-    def _take(self, outcome: SlideOutcome) -> None:
+    def take(self, outcome: SlideOutcome) -> None:
+        """Take a slide that has ended, and work out the law anew."""
         self._in_direction[outcome.direction].appendleft(outcome)
         self._solve()
 

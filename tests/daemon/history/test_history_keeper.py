@@ -18,6 +18,7 @@ from positioner.daemon.history.decision_events import Happened, events_between
 from positioner.daemon.history.health_hours import HealthLook
 from positioner.history import HistoryReader
 from positioner.history.entries import ConfigurationChange, Event, HealthHour, Identification, Write
+from tests.cli.test_daemon_process import until
 from tests.control.test_controller import Bench, automatic
 from tests.daemon.test_supervisory_registers import Panel, refused
 from tests.history.test_history_file import full_above
@@ -172,12 +173,14 @@ def test_an_identification_is_kept_with_its_deviations(site: Site) -> None:
     assert abs(row.time_s - time.time()) < 60
 
 
-def test_an_hour_keeps_the_worst_class_and_the_counts_of_its_end(site: Site, monkeypatch: pytest.MonkeyPatch) -> None:
+def test_an_hour_keeps_the_worst_class_and_the_counts_of_its_end(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
     looks = [Ne107Status.GOOD, Ne107Status.FAILURE, Ne107Status.GOOD]
     record = HealthRecord()
-    site.valve.look = lambda: HealthLook(looks.pop(0), record, 20e3, 10, 1, 2, 3, 4)
     monkeypatch.setattr(history_keeper, "HEALTH_EVERY_S", 0.0)
-    site.keeper._health_due_s = 0.0
+    site = Site(tmp_path)
+    site.valve.look = lambda: HealthLook(looks.pop(0), record, 20e3, 10, 1, 2, 3, 4)
     for _ in range(3):
         site.keeper.turn()
     with HistoryReader(site.folder) as history:
@@ -362,7 +365,7 @@ def test_a_thread_that_dies_says_so(tmp_path: Path, monkeypatch: pytest.MonkeyPa
     site = Site(tmp_path)
     site.valve.look = lambda: 1 / 0  # type: ignore[assignment]
     site.keeper.start()
-    site.keeper._thread.join()
+    until(lambda: died != [], "the thread's end")
     assert died == ["history: division by zero"]
     site.valve.look = None
     site.keeper.stop("history died")
