@@ -18,7 +18,8 @@ from positioner.cli.parts.children import port_in
 from positioner.dcs import Dcs, DcsError
 from sim.slave import canopen_slave
 from tests.children import Child, child, running
-from tests.cli.test_daemon_process import LAW, until
+from tests.daemon_files import LAW
+from tests.waiting import until
 
 pytestmark = pytest.mark.real_time
 

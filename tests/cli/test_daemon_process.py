@@ -5,7 +5,7 @@ import signal
 import socket
 import struct
 import time
-from collections.abc import Callable, Iterator
+from collections.abc import Iterator
 from concurrent.futures import ThreadPoolExecutor
 from contextlib import ExitStack, contextmanager, suppress
 from dataclasses import dataclass
@@ -23,43 +23,14 @@ from positioner.cli.main import main
 from positioner.cli.parts.children import port_in
 from positioner.dcs import Dcs, DcsError
 from tests.children import child, ended, running
+from tests.daemon_files import PATIENT, daemon_file, slave_file
 from tests.independent import independent_client, refused_with
+from tests.waiting import until
 
 pytestmark = pytest.mark.real_time
 
-WITHIN_S = 60.0
 STOPS = 8
 """Of a daemon, of which one is not just before a command is sent."""
-LAW = "[law]\nb_over_c_pa_per_m = -814542.6\nk_over_c_pa = -22068.2\n"
-
-
-def until(holds: Callable[[], bool], what: str) -> None:
-    """Wait for something that must come; its not coming is the failure."""
-    end_s = time.monotonic() + WITHIN_S
-    while not holds():
-        assert time.monotonic() < end_s, f"{what} did not come within {WITHIN_S:g} s"
-        time.sleep(0.01)
-
-
-def slave_file(folder: Path, port: int = 5020) -> Path:
-    path = folder / "slave.toml"
-    path.write_text(
-        f"[bus]\nport = {port}\n[sensor]\nnoise_std_m = 1e-5\n[initial]\nposition_m = 0.03\npressure_pa = 24000.0\n"
-    )
-    return path
-
-
-PATIENT = "reply_timeout_s = 2.0\n"
-"""Where the device's promptness is no matter, so that a busy machine is none."""
-
-
-def daemon_file(folder: Path, device_port: int, more: str = "", device: str = "", period_s: float = 2e-3) -> Path:
-    path = folder / "daemon.toml"
-    path.write_text(
-        "[valve]\nname = 'FV-101'\nstroke_m = 0.1016\n"
-        f"[device]\nport = {device_port}\n{device}[cycle]\nperiod_s = {period_s}\n[supervisory]\nport = 0\n{LAW}{more}"
-    )
-    return path
 
 
 @pytest.fixture(scope="module")

@@ -29,7 +29,7 @@ from positioner.cli.parts.demo_folder import demo_folder, recording_in
 from positioner.cli.parts.simulated_plant import SLAVE_HEAD, daemon_running, slave_running
 from positioner.dcs import Dcs
 from tests.children import running
-from tests.cli.test_daemon_process import until
+from tests.waiting import until
 
 pytestmark = pytest.mark.real_time
 

@@ -18,7 +18,8 @@ from positioner.cli.parts.experiment_player import RunningValve, is_of, player_o
 from positioner.dcs import Dcs
 from positioner.tests_on_the_valve.program import Leap, ramped
 from tests.children import running
-from tests.cli.test_daemon_process import daemon_file, slave_file, until
+from tests.daemon_files import daemon_file, slave_file
+from tests.waiting import until
 from workbench.discriminate.experiment_design import Course, DesignedExperiment, Leg
 
 pytestmark = pytest.mark.real_time

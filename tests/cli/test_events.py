@@ -2,8 +2,6 @@
 
 import json
 import signal
-import time
-from collections.abc import Callable
 from pathlib import Path
 
 import pytest
@@ -17,19 +15,12 @@ from positioner.dcs import Dcs
 from positioner.history import HistoryReader
 from positioner.history.entries import Write
 from tests.children import child, ended, running
-from tests.cli.test_daemon_process import PATIENT, daemon_file, slave_file
+from tests.daemon_files import PATIENT, daemon_file, slave_file
 from tests.history.test_history_file import altered, event, opened, write
+from tests.waiting import until
 
-WITHIN_S = 60.0
 REFERENCE = BY_NAME["reference"]
 HISTORY = "[history]\nfolder = 'history'\n"
-
-
-def until(holds: Callable[[], bool], what: str) -> None:
-    end_s = time.monotonic() + WITHIN_S
-    while not holds():
-        assert time.monotonic() < end_s, f"{what} did not come within {WITHIN_S:g} s"
-        time.sleep(0.01)
 
 
 def printed(capsys: pytest.CaptureFixture[str], *words: str) -> list[str]:

@@ -16,7 +16,8 @@ from positioner.cli.parts.pseudo_line import pseudo_line
 from positioner.dcs import Dcs
 from sim.slave.slave import slave_of
 from tests.children import ended, running
-from tests.cli.test_daemon_process import LAW, until
+from tests.daemon_files import LAW
+from tests.waiting import until
 
 pytestmark = pytest.mark.real_time
 

@@ -24,7 +24,8 @@ from positioner.cli.parts.children import port_in
 from positioner.cli.parts.trial_authority import Authority, Owner
 from positioner.dcs import Dcs
 from tests.children import ended, running
-from tests.cli.test_daemon_process import LAW, until
+from tests.daemon_files import LAW
+from tests.waiting import until
 
 pytestmark = pytest.mark.real_time
 

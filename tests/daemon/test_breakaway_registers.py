@@ -6,7 +6,7 @@ import pytest
 
 from config.codes import Refusal
 from config.registers import BY_NAME
-from tests.daemon.test_supervisory_registers import Panel
+from tests.daemon.panel import Panel
 
 FORCE_AT_BREAKAWAY_PA = 1708.09 / 0.0645
 

@@ -9,7 +9,7 @@ import pytest
 from config.codes import ExperimentState
 from fieldbus.modbus.server import RegisterServer
 from positioner.dcs import Dcs, DcsError
-from tests.daemon.test_supervisory_registers import Panel
+from tests.daemon.panel import Panel
 
 LONG = ((0.0, 30e3), (900.0, 30e3), (901.0, 40e3))
 

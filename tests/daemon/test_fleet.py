@@ -5,7 +5,7 @@ import logging
 import os
 import time
 import tty
-from collections.abc import Callable, Iterator
+from collections.abc import Iterator
 from contextlib import contextmanager
 from dataclasses import dataclass
 from pathlib import Path
@@ -42,6 +42,7 @@ from sim.slave.device_registers import DeviceRegisters
 from sim.slave.modbus_slave import device_of
 from sim.slave.simulated_device import Device
 from tests.children import running
+from tests.waiting import until
 
 pytestmark = pytest.mark.real_time
 
@@ -305,13 +306,6 @@ def site(tmp_path_factory: pytest.TempPathFactory) -> Iterator[Site]:
     """All that a daemon of several valves promises holds as well where its processes share them."""
     with fleet(tmp_path_factory.mktemp("fleet"), processes=3) as here:
         yield here
-
-
-def until(holds: Callable[[], bool], what: str) -> None:
-    end_s = time.monotonic() + WITHIN_S
-    while not holds():
-        assert time.monotonic() < end_s, f"{what} did not come within {WITHIN_S:g} s"
-        time.sleep(0.02)
 
 
 def test_each_valve_answers_under_its_unit(site: Site) -> None:

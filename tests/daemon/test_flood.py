@@ -17,7 +17,8 @@ from config.codes import Fault
 from positioner.cli.parts.children import port_in
 from positioner.dcs import Dcs
 from tests.children import child, running
-from tests.cli.test_daemon_process import PATIENT, daemon_file, slave_file, until
+from tests.daemon_files import PATIENT, daemon_file, slave_file
+from tests.waiting import until
 
 pytestmark = pytest.mark.patient
 

@@ -10,7 +10,7 @@ from config.travel import Travel
 from positioner.daemon.local_switch import locks_out
 from positioner.daemon.supervisory_registers import SupervisoryRegisters
 from tests.daemon.history.test_history_keeper import Site
-from tests.daemon.test_supervisory_registers import refused
+from tests.daemon.panel import refused
 
 
 def test_the_switch_locks_out_all_writes_but_the_heartbeat_and_is_an_event(tmp_path: Path) -> None:

@@ -21,7 +21,7 @@ from fieldbus.modbus.server import RegisterServer
 from fieldbus.modbus.tls import client_context
 from positioner.daemon.service import guard_of
 from tests.certificates import tls
-from tests.daemon.test_supervisory_registers import Panel
+from tests.daemon.panel import Panel
 
 ROLES = (Role.OBSERVER, Role.OPERATOR, Role.ENGINEER)
 AT_ONCE = 40

@@ -13,7 +13,7 @@ import pytest
 from positioner.cli.parts.children import port_in
 from positioner.daemon.service_manager import ServiceManager
 from tests.children import running
-from tests.cli.test_daemon_process import PATIENT, daemon_file, slave_file
+from tests.daemon_files import PATIENT, daemon_file, slave_file
 
 
 class Systemd:

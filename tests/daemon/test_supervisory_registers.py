@@ -2,74 +2,24 @@
 
 import logging
 import math
-from collections.abc import Mapping, Sequence
+from collections.abc import Sequence
 
 import pytest
 from pymodbus.constants import ExcCodes
 
 from config.codes import Fault, InhibitReason, Mode, Ne107Status, Quality
-from config.daemon_file import DaemonFile
 from config.registers import BY_NAME, FLOAT_TEST, LONG_TEST, SIZE, WORD_TEST
-from config.slave_file import SlaveFile
-from config.travel import Travel
-from config.valve_file import shipped_valve
 from drivers.boundary import Capabilities, NoConnection, Reading
 from fieldbus.modbus.register_answers import RegisterError
 from fieldbus.modbus.server import RegisterServer
 from positioner import dcs
-from positioner.control.requests import Requests
-from positioner.control.travel.signal_path import SignalPath
-from positioner.daemon.cycle import Cycle
-from positioner.daemon.supervisory_registers import SupervisoryRegisters, version_numbers
-from positioner.virtual.virtual_cycle import virtual_cycle
-from sim.slave.modbus_slave import device_of
-
-STROKE_M = 0.1016
-LAW = {"b_over_c_pa_per_m": -814e3, "k_over_c_pa": -22e3}
-
-
-class Panel:
-    """Registers of a daemon on a virtual valve, by name."""
-
-    def __init__(self, tables: Mapping[str, object] | None = None) -> None:
-        daemon = DaemonFile.model_validate(
-            {
-                "valve": {"stroke_m": STROKE_M},
-                "law": LAW,
-                "control": {"law": "seed"},
-                "pressure": {"minimum_pa": 0.0, "maximum_pa": 200e3},
-            }
-            | dict(tables or {})
-        )
-        slave = SlaveFile.model_validate({"clock": {"mode": "lockstep"}, "initial": {"position_m": 0.02}})
-        self.cycle: Cycle = virtual_cycle(daemon, device_of(slave, shipped_valve("seed")), Requests())
-        path = SignalPath.of(daemon.travel)
-        self.registers = SupervisoryRegisters(self.cycle, Travel(STROKE_M), 0.0, 200e3, path=path)
-
-    def get(self, name: str) -> float:
-        register = BY_NAME[name]
-        return register.format.decode(self.registers.read("holding", register.address, register.format.words))
-
-    def set(self, name: str, value: float) -> None:
-        register = BY_NAME[name]
-        self.registers.write(register.address, register.format.encode(value), "test")
-
-    def run(self, cycles: int = 1) -> None:
-        for _ in range(cycles):
-            self.cycle.once()
+from positioner.daemon.supervisory_registers import version_numbers
+from tests.daemon.panel import STROKE_M, Panel, refused
 
 
 @pytest.fixture
 def panel() -> Panel:
     return Panel()
-
-
-def refused(panel: Panel, name: str, value: float) -> ExcCodes:
-    before = panel.cycle.requests
-    with pytest.raises(RegisterError) as caught:
-        panel.set(name, value)
-    assert panel.cycle.requests == before, "nothing changed"
-    return caught.value.code
 
 
 def test_every_register_can_be_read_alone_and_all_at_once(panel: Panel) -> None:

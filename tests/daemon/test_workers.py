@@ -28,7 +28,8 @@ from positioner.daemon.workers import Workers
 from positioner.dcs import Dcs, DcsError
 from positioner.history import FILE_NAME
 from tests.children import Child
-from tests.daemon.test_fleet import device, registers_of, served, simulated_at, until
+from tests.daemon.test_fleet import device, registers_of, served, simulated_at
+from tests.waiting import until
 
 pytestmark = pytest.mark.real_time
 

@@ -30,7 +30,7 @@ from sim.slave.clocks import Lockstep
 from sim.slave.device_registers import DeviceRegisters
 from sim.slave.modbus_slave import device_of
 from sim.slave.rtu_server import RtuServer
-from tests.daemon.test_supervisory_registers import Panel
+from tests.daemon.panel import Panel
 from tests.fuzz.parser import Broken, Parser, refused_in_one_line
 from tests.fuzz.wires import Bytes, HeardLine, SpoiltBus, SpoiltLine, SpoiltSocket
 

@@ -25,8 +25,8 @@ from positioner.cli.parts.children import port_in
 from positioner.daemon.cycle_statistics import CycleStatistics
 from positioner.daemon.supervisory_registers import SupervisoryRegisters
 from tests.children import child, running
-from tests.cli.test_daemon_process import PATIENT, daemon_file, slave_file
-from tests.daemon.test_supervisory_registers import Panel
+from tests.daemon.panel import Panel
+from tests.daemon_files import PATIENT, daemon_file, slave_file
 
 DEPLOY = Path(__file__).parents[2] / "deploy"
 ALERTS = DEPLOY / "prometheus" / "alerts.yml"

@@ -26,7 +26,7 @@ from positioner.cli.main import main
 from positioner.cli.parts.children import port_in
 from positioner.dcs import Dcs
 from tests.children import child, running
-from tests.cli.test_daemon_process import PATIENT, daemon_file, slave_file
+from tests.daemon_files import PATIENT, daemon_file, slave_file
 
 pytestmark = pytest.mark.patient
 

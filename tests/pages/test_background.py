@@ -4,7 +4,7 @@ from threading import Event
 import pytest
 
 from config.errors import InputError
-from tests.cli.test_daemon_process import until
+from tests.waiting import until
 from workbench.page.background import Failed, News, Progressed, Tell, Work
 
 pytestmark = pytest.mark.patient

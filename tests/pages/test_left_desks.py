@@ -11,8 +11,8 @@ from typing import TYPE_CHECKING, cast
 
 import pytest
 
-from tests.cli.test_daemon_process import until
 from tests.pages.laid_out import ends, hidden, never_ends
+from tests.waiting import until
 from workbench.page.background import Work
 from workbench.page.desk import Desk
 from workbench.page.provenance import NamedValve

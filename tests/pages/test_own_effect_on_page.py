@@ -10,8 +10,8 @@ from config.errors import InputError
 from config.valve_file import valve
 from sim.effect import FOLDERS_ALLOWED, find_effect
 from sim.own_effect import EXAMPLE, check_effect
-from tests.cli.test_daemon_process import until
 from tests.pages.laid_out import hidden
+from tests.waiting import until
 from workbench.page.background import Finished, News, Progressed, Work
 from workbench.page.command_lines import command_lines
 from workbench.page.desk import Desk

@@ -1,8 +1,6 @@
 """Fleets on Dask: workers, clients and schedulers that are killed, recordings that hang or kill."""
 
 import shutil
-import time
-from collections.abc import Callable
 from pathlib import Path
 from typing import Any
 
@@ -12,12 +10,15 @@ import pytest
 from config.errors import CommandFailed
 from positioner.cli.main import main
 from tests.children import FORKS, Child
+from tests.waiting import until
 from tests.workbench.fleets import HEAD, examined_here, plant, serve_cluster, tables
 from workbench.fleet import engine
 from workbench.fleet.fleet import fleet
 from workbench.fleet.tables import write_tables
 
 ROOT = Path(__file__).parents[2]
+PATIENCE_S = 250.0
+"""For workers that are started on a busy machine."""
 
 
 @pytest.fixture
@@ -107,15 +108,15 @@ def test_a_killed_worker_and_then_a_killed_client_lose_nothing(site: Path, tmp_p
     small = Path(shutil.copy(site.with_name("small.csv"), site.with_name("killed.csv")))
     client = Child("fleet", small, "--out", str(out), "--workers", "1", starts_others=True)
     try:
-        until(lambda: kept(out) >= 1)
+        until(lambda: kept(out) >= 1, "the first recording", PATIENCE_S)
         (worker,) = workers_of(client.pid)
         worker.kill()
-        until(lambda: kept(out) >= 3)
+        until(lambda: kept(out) >= 3, "the third recording", PATIENCE_S)
         left = workers_of(client.pid)
         client.kill()
     finally:
         client.close()
-    until(lambda: not any(each.is_running() for each in left))
+    until(lambda: not any(each.is_running() for each in left), "the end of the workers", PATIENCE_S)
     before = kept(out)
     found = fleet(small, out)
     assert found.examined == 6 - before, "five that can be read, and the unreadable one"
@@ -135,7 +136,7 @@ def test_a_scheduler_that_is_killed_is_one_line_and_the_same_command_goes_on(
     said.close()
     client = Child("fleet", small, "--out", str(out), "--scheduler", heard.recv())
     try:
-        until(lambda: kept(out) >= 2)
+        until(lambda: kept(out) >= 2, "the second recording", PATIENCE_S)
         scheduler.kill()
         status, _, log = client.ended()
     finally:
@@ -155,10 +156,3 @@ def kept(out: Path) -> int:
 def workers_of(pid: int) -> list[psutil.Process]:
     children = psutil.Process(pid).children(recursive=True)
     return [each for each in children if "spawn_main" in " ".join(each.cmdline())]
-
-
-def until(holds: Callable[[], bool]) -> None:
-    end_s = time.monotonic() + 250.0
-    while not holds():
-        assert time.monotonic() < end_s
-        time.sleep(0.02)

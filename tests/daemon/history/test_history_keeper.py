@@ -18,10 +18,10 @@ from positioner.daemon.history.decision_events import Happened, events_between
 from positioner.daemon.history.health_hours import HealthLook
 from positioner.history import HistoryReader
 from positioner.history.entries import ConfigurationChange, Event, HealthHour, Identification, Write
-from tests.cli.test_daemon_process import until
 from tests.control.test_controller import Bench, automatic
-from tests.daemon.test_supervisory_registers import Panel, refused
+from tests.daemon.panel import Panel, refused
 from tests.history.test_history_file import full_above
+from tests.waiting import until
 
 FILE = DaemonFile.model_validate({"valve": {"name": "FV 1", "stroke_m": 0.1016}})
 CLASSES = HealthSettings.of(FILE.health, 0.1016, FILE.supervision).fault_classes
