@@ -93,7 +93,7 @@ class Spoilt:
     """A device whose position sensor fails; all else goes on."""
 
     def __init__(self, device: Device, fault: SensorFault) -> None:
-        self._device, self._fault = device, fault
+        self._device, self.fault = device, fault
         self.position_m = device.position_m
         self._measure()
 
@@ -101,7 +101,7 @@ class Spoilt:
         return getattr(self._device, name)
 
     def _measure(self) -> None:
-        fault, now_s = self._fault, self._device.device_time_us / 1e6
+        fault, now_s = self.fault, self._device.device_time_us / 1e6
         if not fault.at_s <= now_s < fault.at_s + fault.over_s:
             self.position_m = self._device.position_m
         elif not np.isnan(fault.by_m):

@@ -91,26 +91,33 @@ class Stem:
 
     def advance(self, command_pa: float, duration_s: float) -> None:
         """Let it obey a command for a while, in whole steps."""
+        q, x, v, z, pressure_pa = self.parameters, self.position_m, self._velocity, self._bent_m, self.pressure_pa
+        coulomb_n, excess_n, stribeck = q.coulomb_n, q.static_n - q.coulomb_n, q.stribeck_m_per_s
+        bristle, damping, asymmetry, stroke_m = q.bristle_n_per_m, q.bristle_damping_ns_per_m, q.asymmetry, q.stroke_m
+        area_m2, spring, preload_n, viscous, stop = (
+            q.area_m2,
+            q.spring_n_per_m,
+            q.preload_n,
+            q.viscous_ns_per_m,
+            q.stop_n_per_m,
+        )
+        speeding, follows = STEP_S / q.mass_kg, STEP_S / q.lag_s
         for _ in range(round(duration_s / STEP_S)):
-            self._step(command_pa)
-
-    def _step(self, command_pa: float) -> None:
-        q, v, z = self.parameters, self._velocity, self._bent_m
-        level_n = q.coulomb_n + (q.static_n - q.coulomb_n) * exp(-((v / q.stribeck_m_per_s) ** 2))
-        level_n *= 1.0 + q.asymmetry * ((v > 0.0) - (v < 0.0))
-        bending = v - q.bristle_n_per_m * abs(v) * z / level_n
-        friction_n = q.bristle_n_per_m * z + q.bristle_damping_ns_per_m * bending
-        beyond_m = min(self.position_m, 0.0) + max(self.position_m - q.stroke_m, 0.0)
-        force_n = q.area_m2 * self.pressure_pa - q.spring_n_per_m * self.position_m - q.preload_n
-        force_n -= friction_n + q.viscous_ns_per_m * v + q.stop_n_per_m * beyond_m
-        v += STEP_S * force_n / q.mass_kg
-        self.position_m += STEP_S * v
-        if v != 0.0:
-            bent_at_last_m = level_n / q.bristle_n_per_m * (1.0 if v > 0 else -1.0)
-            left = exp(-q.bristle_n_per_m * abs(v) * STEP_S / level_n)
-            self._bent_m = bent_at_last_m + (z - bent_at_last_m) * left
-        self._velocity = v
-        self.pressure_pa += (command_pa - self.pressure_pa) * STEP_S / q.lag_s
+            level_n = coulomb_n + excess_n * exp(-((v / stribeck) ** 2))
+            level_n *= 1.0 + asymmetry * ((v > 0.0) - (v < 0.0))
+            bending = v - bristle * abs(v) * z / level_n
+            force_n = area_m2 * pressure_pa - spring * x - preload_n - viscous * v - bristle * z - damping * bending
+            if x < 0.0:
+                force_n -= stop * x
+            elif x > stroke_m:
+                force_n -= stop * (x - stroke_m)
+            v += speeding * force_n
+            x += STEP_S * v
+            if v != 0.0:
+                bent_at_last_m = level_n / bristle * (1.0 if v > 0 else -1.0)
+                z = bent_at_last_m + (z - bent_at_last_m) * exp(-bristle * abs(v) * STEP_S / level_n)
+            pressure_pa += (command_pa - pressure_pa) * follows
+        self.position_m, self._velocity, self._bent_m, self.pressure_pa = x, v, z, pressure_pa
 
 
 class OtherDevice:

@@ -53,7 +53,7 @@ class Cycle:
         self.recorder = recorder
         self.health = health
         self.history = history
-        self._controller = controller
+        self.controller = controller
         self.pace = pace
         self._valve = valve
         sent_pa = controller.command_pa
@@ -64,7 +64,7 @@ class Cycle:
         with logging_valve(self._valve):
             self.pace.prepare()
             self.link.begin()
-            self._controller.begin()
+            self.controller.begin()
 
     def turn(self) -> None:
         """Wait until the next cycle is due and run it."""
@@ -81,12 +81,12 @@ class Cycle:
 
     def ask(self) -> int | None:
         """Begin a cycle by asking the device; return what is ready when it answers. None: `whole` does it all."""
-        return self.link.ask(self._controller.command_pa)
+        return self.link.ask(self.controller.command_pa)
 
     def answer(self, *, late: bool) -> bool:
         """End a cycle that has asked, if the answer has come, or the time for it is over; return whether it has."""
         with logging_valve(self._valve):
-            sent_pa = self._controller.command_pa
+            sent_pa = self.controller.command_pa
             sample = self.link.answer(late=late)
             if sample is not None:
                 self._conclude(sent_pa, sample)
@@ -98,7 +98,7 @@ class Cycle:
 
     def once(self) -> None:
         """Run one cycle."""
-        sent_pa = self._controller.command_pa
+        sent_pa = self.controller.command_pa
         self._conclude(sent_pa, self.link.exchange(sent_pa))
 
     def _conclude(self, sent_pa: float, sample: Sample) -> None:
@@ -114,7 +114,7 @@ class Cycle:
             self.history.enter(before, decision)
 
     def _decided(self, sent_pa: float, sample: Sample) -> Snapshot:
-        decision = self._controller.step(sample, self.requests)
+        decision = self.controller.step(sample, self.requests)
         if self.recorder is not None and sample.quality is GOOD:
             # A device that was only looked at has got nothing.
             given_pa = sent_pa if sample.held_pa is None else sample.held_pa

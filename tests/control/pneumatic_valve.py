@@ -1,12 +1,15 @@
 """A pneumatic valve of these tests' own under the daemon's law: behind an I/P, whose supply may fall."""
 
 from collections.abc import Callable
+from copy import deepcopy
+from functools import cache
 
+from config.codes import State
 from config.daemon_file import DaemonFile
 from tests.control.virtual_loop import VirtualLoop
 
 STROKE_M, AREA_M2, SPRING_N_PER_M, PRELOAD_N, COULOMB_N, STATIC_N = 0.04, 0.07, 140e3, 1400.0, 400.0, 480.0
-LAG_S, VISCOUS_NS_PER_M, PERIOD_S, SUBSTEP_S, QUANTUM_M = 0.05, 2100.0, 0.1, 1e-3, 2.5e-6
+LAG_S, VISCOUS_NS_PER_M, PERIOD_S, SUBSTEP_S, QUANTUM_M = 0.05, 2100.0, 0.1, 2e-3, 2.5e-6
 GOOD_PA = 300e3
 
 
@@ -31,13 +34,16 @@ class PneumaticValve:
         self.command_pa = command_pa
         self.sample_counter += 1
         for _ in range(round(PERIOD_S / SUBSTEP_S)):
-            self.actuator_pa += (min(command_pa, self.supply_pa) - self.actuator_pa) * SUBSTEP_S / LAG_S
+            before_pa = self.actuator_pa
+            self.actuator_pa += (min(command_pa, self.supply_pa) - before_pa) * SUBSTEP_S / LAG_S
             force_n = AREA_M2 * self.actuator_pa - PRELOAD_N - SPRING_N_PER_M * self.stem_m
             sense = 1 if force_n > 0 else -1
             slides = abs(force_n) > (COULOMB_N if self.moving == sense else STATIC_N)
             self.moving = sense if slides else 0
             speed = (force_n - sense * COULOMB_N) / VISCOUS_NS_PER_M if slides else 0.0
             self.stem_m = min(max(self.stem_m + speed * SUBSTEP_S, 0.0), STROKE_M)
+            if not slides and self.actuator_pa == before_pa:
+                break  # it stands until another command
         self.position_m = QUANTUM_M * round(self.stem_m / QUANTUM_M)
         self.pressure_pa = self.measured(self.actuator_pa)
 
@@ -63,7 +69,9 @@ class Loop(VirtualLoop):
 
     def identified(self) -> "Loop":
         self.begin()
-        self.cycles(200.0)
+        self.cycles(PERIOD_S)
+        while self.decision.progress < 1.0 and self.decision.state is State.S3_IDENTIFY:
+            self.cycles(PERIOD_S)
         self.end()
         assert self.decision.applied.ratios is not None
         return self
@@ -75,3 +83,13 @@ class Loop(VirtualLoop):
 
     def error_at(self, reference_pu: float) -> float:
         return self.valve.stem_m / STROKE_M - reference_pu
+
+
+def identified(law: str = "slides") -> Loop:
+    """Return a loop of one's own; the one that it is copied from is identified once."""
+    return deepcopy(_identified(law))
+
+
+@cache
+def _identified(law: str) -> Loop:
+    return Loop(law=law).identified()

@@ -4,7 +4,9 @@ import math
 import subprocess
 import sys
 from collections.abc import Callable
+from copy import deepcopy
 from dataclasses import replace
+from functools import cache
 from pathlib import Path
 
 import pytest
@@ -53,6 +55,10 @@ class Plant:
     def run(self, seconds: float) -> Decision:
         for _ in range(round(seconds / 1e-3)):
             self.cycle.once()
+        return self.decision
+
+    @property
+    def decision(self) -> Decision:
         return self.cycle.snapshot.decision
 
     def identify(self, seconds: float = 1.0) -> Decision:
@@ -66,10 +72,22 @@ class Plant:
         return self.cycle.snapshot.sample.position_m / STROKE_M
 
 
+@cache
+def _identified(seed: int) -> Plant:
+    plant = Plant(seed)
+    plant.identify()
+    return plant
+
+
+def identified(seed: int = 0) -> Plant:
+    """Return a plant of one's own; the one that it is copied from is identified once."""
+    return deepcopy(_identified(seed))
+
+
 @pytest.mark.parametrize("seed", few_always(range(4)))
 def test_identified_ratios_are_within_1_percent_and_steps_within_1_percent_of_the_stroke(seed: int) -> None:
-    plant = Plant(seed)
-    ratios = plant.identify().applied.ratios
+    plant = identified(seed)
+    ratios = plant.decision.applied.ratios
     assert ratios is not None
     assert ratios.b_over_c == pytest.approx(B_OVER_C, rel=0.01)
     assert ratios.k_over_c == pytest.approx(K_OVER_C, rel=0.01)
@@ -80,8 +98,8 @@ def test_identified_ratios_are_within_1_percent_and_steps_within_1_percent_of_th
 
 
 def test_a_second_identification_that_finds_nothing_leaves_the_first_in_use() -> None:
-    plant = Plant(0)
-    first = plant.identify()
+    plant = identified()
+    first = plant.decision
     plant.ask(beta_pa=10.0, alpha_pa=first.command_pa + 1.0)
     second = plant.identify(0.5)
     assert first.applied.ratios is not None
@@ -94,8 +112,8 @@ def test_a_second_identification_that_finds_nothing_leaves_the_first_in_use() ->
 
 def test_a_ratio_alone_is_renewed_by_the_friction_estimator() -> None:
     """eta_2 = 1: b/c stays, k/c follows."""
-    plant = Plant(1)
-    first = plant.identify().applied.ratios
+    plant = identified()
+    first = plant.decision.applied.ratios
     plant.run(0.3)
     plant.ask(eta=(0, 1, 0))
     plant.run(1.0)
@@ -127,18 +145,23 @@ def interrupted(index: int, sample: Sample) -> Sample:
     return sample._replace(quality=Quality.LOST, position_m=math.nan) if 300 <= index < 330 else sample
 
 
-@pytest.mark.parametrize("spoil", few_always([spiked, interrupted, dropped, repeated], 2))
-def test_measurements_that_are_none_do_not_reach_the_estimators(spoil: Spoil) -> None:
-    plant = Plant(2)
-    seen: list[tuple[Sample, Requests]] = []
+@cache
+def seen() -> tuple[tuple[Sample, Requests], ...]:
+    """Samples and requests of an identification, and what is asked for then."""
+    plant, seen = Plant(2), []
     for index in range(1100):
         plant.ask(eta=IDENTIFY if 100 <= index < 1050 else QUIET)
         plant.cycle.once()
         seen.append((plant.cycle.snapshot.sample, plant.cycle.requests))
+    return tuple(seen)
+
+
+@pytest.mark.parametrize("spoil", few_always([spiked, interrupted, dropped, repeated], 2))
+def test_measurements_that_are_none_do_not_reach_the_estimators(spoil: Spoil) -> None:
     # A gap that is a fault would end the identification.
     patient = DAEMON.safety.model_copy(update={"lost_after_cycles": 50})
     controller = Controller(Settings.of(DAEMON.model_copy(update={"safety": patient})), 0.0)
-    decisions = [controller.step(spoil(index, sample), requests) for index, (sample, requests) in enumerate(seen)]
+    decisions = [controller.step(spoil(index, sample), requests) for index, (sample, requests) in enumerate(seen())]
     ratios = decisions[-1].applied.ratios
     assert ratios is not None
     assert ratios.b_over_c == pytest.approx(B_OVER_C, rel=0.01)

@@ -10,7 +10,7 @@ from positioner.estimation.landings.stem_at_rest import Rest, RestWindow
 from tests.control.virtual_loop import VirtualLoop, assert_static_law
 
 STROKE_M, AREA_M2, SPRING_N_PER_M, PRELOAD_N, COULOMB_N, VISCOUS_NS_PER_M = 0.04, 0.07, 140e3, 1400.0, 400.0, 2100.0
-PERIOD_S, SUBSTEP_S, QUANTUM_M = 0.1, 1e-3, 2.5e-6
+PERIOD_S, SUBSTEP_S, QUANTUM_M = 0.1, 2e-3, 2.5e-6
 SLOW, FAST = 2e7, 2e6
 """N s/m: creeps of 20 and 200 um/s under the friction that a slide leaves, 3 % and 30 % of the stroke a minute."""
 GOOD_PA = 140e3

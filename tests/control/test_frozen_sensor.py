@@ -79,8 +79,7 @@ def run_to_the_fault(loop: VirtualLoop, freeze: Any, stem_pu: Any) -> list[float
             ("daemon.toml", 0, "slave.toml", "seed"),
             ("daemon_canopen.toml", 0, "slave_canopen.toml", "seed"),
             ("fleet.toml", 1, "slave.toml", "seed"),
-        ],
-        2,
+        ]
     ),
 )
 def test_a_sensor_that_freezes_is_a_fault_by_the_shipped_files(
@@ -94,7 +93,7 @@ def test_a_sensor_that_freezes_is_a_fault_by_the_shipped_files(
     device = Spoilt(Device(model, table, {}), SensorFault(inf, inf, nan))
 
     def freeze(at_s: float) -> None:
-        device._fault = SensorFault(at_s, inf, nan)
+        device.fault = SensorFault(at_s, inf, nan)
 
     loop = VirtualLoop(file, device)
     off = run_to_the_fault(loop, freeze, lambda: model.position_m / loop.stroke_m)

@@ -19,6 +19,7 @@ from positioner.estimation.refiner import InProcessRefiner
 from positioner.virtual.virtual_cycle import run_identification, virtual_cycle
 from sim.slave.simulated_device import Device
 from sim.valve import Valve
+from tests.cases import few_always
 
 SEED = load_valve(shipped_valve("seed"))
 VALVE = SEED.valve
@@ -69,7 +70,7 @@ def reasons(monkeypatch: pytest.MonkeyPatch) -> list[Refusal]:
     return said
 
 
-@pytest.mark.parametrize("periods", [1, 2, 4, 10])
+@pytest.mark.parametrize("periods", few_always([4, 10, 1, 2], 2))
 def test_late_commands_are_identified(periods: int, reasons: list[Refusal]) -> None:
     """A record that begins two to five samples before the stem leaves has a rest too short to be known by itself."""
     ratios = identified_when_late(periods).applied.ratios

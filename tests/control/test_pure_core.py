@@ -23,6 +23,7 @@ from positioner.daemon.snapshot import Snapshot
 from positioner.estimation.refiner import Refinement
 from positioner.virtual.virtual_cycle import play_script, virtual_cycle
 from sim.slave.modbus_slave import device_of
+from tests.cases import few_always
 
 STROKE_M = 0.1016
 LAWS = {"seed": 44e3, "slides": 0.0}
@@ -97,7 +98,7 @@ def spoilt(given: Inputs, rng: np.random.Generator) -> Inputs:
 
 
 @pytest.mark.parametrize("law", LAWS)
-@pytest.mark.parametrize("seed", range(2))
+@pytest.mark.parametrize("seed", few_always(range(4)))
 def test_the_same_memory_and_inputs_give_the_same_and_a_copy_leaves_no_trace(law: str, seed: int) -> None:
     settings, given, rng = Settings.of(daemon(law)), inputs(law), np.random.default_rng(seed)
     at = int(rng.integers(20, len(given) - AHEAD))
@@ -126,7 +127,7 @@ def disturbed(given: Inputs, rng: np.random.Generator) -> Inputs:
     )
     told, left, event, ended = [], 0, events[0], 0
     for sample, asked in given:
-        if not left and rng.random() < 0.03:
+        if not left and rng.random() < 0.02:
             left, event = int(rng.integers(1, 12)), events[int(rng.integers(len(events)))]
         requests = replace(asked, acknowledgements=ended, mode_writes=asked.mode_writes + ended)
         told.append(event(sample, requests) if left else (sample, requests))
@@ -135,10 +136,10 @@ def disturbed(given: Inputs, rng: np.random.Generator) -> Inputs:
 
 
 @pytest.mark.parametrize("law", LAWS)
-@pytest.mark.parametrize("seed", range(2))
+@pytest.mark.parametrize("seed", few_always(range(4)))
 def test_a_decision_that_stands_is_the_one_that_would_be_made_anew(law: str, seed: int) -> None:
     settings = Settings.of(daemon(law))
-    given = disturbed(inputs(law), np.random.default_rng(seed)) if seed else inputs(law)
+    given = disturbed(inputs(law), np.random.default_rng(seed))
     stood, memory, anew = 0, first_memory(settings, 0.0), first_memory(settings, 0.0)
     kept = Requests()
     for sample, asked in given:
@@ -148,4 +149,4 @@ def test_a_decision_that_stands_is_the_one_that_would_be_made_anew(law: str, see
         anew, again = step(anew._replace(stands_for=None), sample, requests, settings)
         assert repr(decision) == repr(again)
     assert whole(memory._replace(stands_for=None)) == whole(anew._replace(stands_for=None))
-    assert stood > (0 if seed else 100)
+    assert stood > 50

@@ -11,7 +11,7 @@ from tests.cases import few_always
 
 SINE, *STAIRCASES = EXPERIMENTS
 JUMPS = [SensorFault(at_s, inf, by * STROKE_M) for by in (-0.1, 0.02, 0.1) for at_s in (0.25, 0.5, 0.8)]
-SHORT = [SensorFault(0.5, 1e-3, 0.1 * STROKE_M), SensorFault(0.7, 0.2, -0.02 * STROKE_M), SensorFault(0.4, 0.2, nan)]
+SHORT = [SensorFault(0.5, 1e-3, 0.1 * STROKE_M), SensorFault(0.4, 0.2, nan), SensorFault(0.7, 0.2, -0.02 * STROKE_M)]
 
 
 def wrong(fault: SensorFault, seed: int = 0) -> bool:
@@ -21,12 +21,12 @@ def wrong(fault: SensorFault, seed: int = 0) -> bool:
     return decision.applied.ratios is not None and min(off(SINE, decision, each) for each in (0.0, by_m)) > 1.0
 
 
-@pytest.mark.parametrize("fault", few_always([*SHORT, *JUMPS[::2]], 4), ids=str)
+@pytest.mark.parametrize("fault", few_always([*SHORT, *JUMPS[::2]], 2), ids=str)
 def test_a_sine_with_a_sensor_that_jumps_applies_nothing_wrong(fault: SensorFault) -> None:
     assert not wrong(fault)
 
 
-@pytest.mark.parametrize("fault", few_always(JUMPS[::2], 2), ids=str)
+@pytest.mark.parametrize("fault", few_always(JUMPS), ids=str)
 def test_nor_where_nobody_refines(fault: SensorFault, monkeypatch: pytest.MonkeyPatch) -> None:
     """The algebraic estimates have a residual of their own."""
 
@@ -43,19 +43,14 @@ def test_the_reason_is_that_the_model_does_not_fit() -> None:
     assert decision.applied.last_refusal is Refusal.MODEL_DOES_NOT_FIT
 
 
-def test_without_a_fault_the_same_is_applied() -> None:
-    decision, _ = identified(SINE, NO_FAULT, 0)
-    assert off(SINE, decision, 0.0) < 1.0
-
-
 SLOW = STAIRCASES[-1]
 SHIFTS = [
     SensorFault(at_s, inf, by * STROKE_M)
-    for at_s, by in ((6.0, 0.02), (6.0, 0.2), (9.98, -0.1), (10.7, 0.02), (10.7, 0.2), (12.0, -0.1))
+    for at_s, by in ((6.0, 0.2), (9.98, -0.1), (10.7, 0.02), (6.0, 0.02), (10.7, 0.2), (12.0, -0.1))
 ]
 
 
-@pytest.mark.parametrize("fault", SHIFTS, ids=str)
+@pytest.mark.parametrize("fault", few_always(SHIFTS, 3), ids=str)
 def test_a_staircase_with_a_sensor_that_jumps_applies_nothing_wrong(fault: SensorFault) -> None:
     """On the way up, at the turn, in the first slide down, on the way down: there is a last landing up to tell."""
     decision, _ = identified(SLOW, fault, 3)

@@ -108,16 +108,22 @@ HARD = [
 SMALL = [Spoiled("drift", by, at_s) for by, at_s in product((-0.004, 0.004, 0.002), (0.0, 0.105, 0.3, 0.6))]
 
 
+OVER_A_GAP = (("spike", 0.0), ("drift", 0.01))
+GAPS = [
+    (Spoiled("spike", 0.0, 0.12), 0.03),
+    (Spoiled("drift", 0.01, 0.12), 0.1),
+    *((Spoiled(*how, at_s), gap_s) for how, at_s, gap_s in product(OVER_A_GAP, (0.12, 0.3, 0.5), (0.02, 0.03, 0.1))),
+]
+
+
 @pytest.mark.parametrize("spoiled", few_always([*HARD, *MATRIX, *SMALL], len(HARD)), ids=str)
 def test_nothing_is_applied_beyond_its_deviation_whatever_the_sensor_does(spoiled: Spoiled) -> None:
     assert_nothing_wrong(identified(spoiled))
 
 
-@pytest.mark.parametrize("at_s", few_always([0.12, 0.3, 0.5]))
-@pytest.mark.parametrize("gap_s", [0.02, 0.03, 0.1])
-@pytest.mark.parametrize("spoiled", [("spike", 0.0), ("drift", 0.01)])
-def test_nor_over_a_gap(spoiled: tuple[str, float], gap_s: float, at_s: float) -> None:
-    assert_nothing_wrong(identified(Spoiled(*spoiled, at_s), gap_s))
+@pytest.mark.parametrize(("spoiled", "gap_s"), few_always(GAPS, 2), ids=str)
+def test_nor_over_a_gap(spoiled: Spoiled, gap_s: float) -> None:
+    assert_nothing_wrong(identified(spoiled, gap_s))
 
 
 def test_a_good_sensor_is_applied() -> None:

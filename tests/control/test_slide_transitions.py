@@ -2,8 +2,9 @@
 
 from collections import Counter
 from collections.abc import Iterator
+from copy import deepcopy
 from dataclasses import replace
-from itertools import islice, pairwise
+from itertools import pairwise
 
 import numpy as np
 import pytest
@@ -15,9 +16,12 @@ from positioner.control.laws.slides.slide_law import SlideLaw
 from positioner.control.laws.slides.slide_memory import SlideMemory
 from positioner.control.laws.slides.states import STATES, Idle, Out, Presliding, Stuck, Waiting
 from positioner.control.laws.slides.transitions import TABLE
+from tests.cases import few_always
 from tests.control.scripted_stem import SETTINGS, SLOPE_PA_PER_M, STEP_S, STROKE_M, ScriptedStem, drawn_stems
 
-COUNT, MOVES = 12, 12
+COUNT, MOVES = 6, 12
+SEEDS = few_always(range(5))
+"""Of the stems drawn: other ones each."""
 
 
 def references(stem: ScriptedStem, moves: int = MOVES) -> list[float]:
@@ -30,37 +34,44 @@ def references(stem: ScriptedStem, moves: int = MOVES) -> list[float]:
     return asked
 
 
-def test_a_move_ends_at_its_reference_within_its_slides_and_bounds_and_is_not_left_again() -> None:
-    """It ends; never more slides than a move has; never beyond pressure, limit and travel; and no limit cycle."""
-    for stem in drawn_stems(COUNT):
+@pytest.mark.parametrize("seed", SEEDS)
+def test_a_move_ends_at_its_reference_within_its_slides_and_bounds_and_slides_teach_to_take_fewer(seed: int) -> None:
+    """No more slides than a move has; never beyond pressure, limit and travel; no limit cycle.
+
+    In the end it takes two, where one would not break loose, and more where scatter, or what lies between, asks for it.
+    """
+    later = []
+    for stem in drawn_stems(COUNT, seed=10 * seed):
         limit_m, most = stem.settings.excursion_limit_m, stem.settings.thresholds.most_slides
-        for reference_m in references(stem):
-            assert stem.moved_to(reference_m) <= most
+        for number, reference_m in enumerate(references(stem, 30)):
+            given = stem.moved_to(reference_m)
+            later += [given] if number >= 15 else []
+            assert given <= most
             assert abs(stem.position_m - reference_m) < 1e-3 * STROKE_M
             assert isinstance(stem.memory.state, Idle)
-            left = stem.memory.command_pa
-            for _ in range(20):
-                stem.now_s += 600.0
-                stem.once(reference_m)
-            assert stem.memory.command_pa == left
+            if number % 3 == 0:
+                assert left_alone(stem, reference_m) == {stem.memory.command_pa}
         assert all(0.0 <= each <= stem.settings.maximum_pa for each in stem.commands_pa)
         assert all(abs(each.position_m - 0.5 * STROKE_M) < 0.25 * STROKE_M + limit_m for each in stem.landings)
-
-
-def test_slides_teach_break_away_until_a_move_takes_no_more_of_them_than_it_must() -> None:
-    """Two, where one would not break loose; a third and a fourth where scatter, or what lies between, asks for them."""
-    for stem in drawn_stems(COUNT, seed=1):
-        asked = references(stem, 30)
-        given = [stem.moved_to(each) for each in asked]
-        assert np.mean(given[15:]) <= 2.6
         assert stem.memory.distances is not None
         for interval in (stem.memory.distances.at(s, turning=True) for s in (1, -1)):
             assert interval.broke_m > 0.95 * stem.turning_m - 3.0 * stem.scatter_m
+    assert np.mean(later) <= 2.3
 
 
-def test_a_stem_that_nothing_breaks_loose_is_stuck_and_one_that_comes_free_goes_to_its_reference() -> None:
-    found = Counter[str]()
-    for stem in drawn_stems(COUNT, seed=2):
+def left_alone(stem: ScriptedStem, reference_m: float) -> set[float]:
+    """Return the commands of a stem in the hours after its move: of a copy, for break-away is known less well then."""
+    alone, commands_pa = deepcopy(stem), set()
+    for _ in range(20):
+        alone.now_s += 600.0
+        alone.once(reference_m)
+        commands_pa.add(alone.memory.command_pa)
+    return commands_pa
+
+
+@pytest.mark.parametrize("seed", SEEDS)
+def test_a_stem_that_nothing_breaks_loose_is_stuck_and_one_that_comes_free_goes_to_its_reference(seed: int) -> None:
+    for stem in drawn_stems(COUNT, seed=10 * seed + 2):
         for reference_m in references(stem):
             stem.moved_to(reference_m)
         stem.settings = replace(stem.settings, excursion_limit_m=0.2 * STROKE_M)
@@ -71,16 +82,15 @@ def test_a_stem_that_nothing_breaks_loose_is_stuck_and_one_that_comes_free_goes_
         assert isinstance(stem.memory.state, Stuck)
         assert stem.memory.inhibit_reason() is InhibitReason.STUCK
         assert stem.memory.distances == before, "what they seem to teach is not believed"
-        found[stem.memory.inhibit_reason().name] += 1
         stem.come_free()
         stem.moved_to(away_m)
         assert abs(stem.position_m - away_m) < 2e-3 * STROKE_M
         assert stem.memory.inhibit_reason() is InhibitReason.NOTHING
-    assert found["STUCK"] == COUNT
 
 
-def test_whatever_interrupts_a_move_holds_what_it_is_given_and_is_taken_over_without_a_bump() -> None:
-    for stem in drawn_stems(COUNT, seed=3):
+@pytest.mark.parametrize("seed", SEEDS)
+def test_whatever_interrupts_a_move_holds_what_it_is_given_and_is_taken_over_without_a_bump(seed: int) -> None:
+    for stem in drawn_stems(COUNT, seed=10 * seed + 3):
         asked = references(stem)
         for number, reference_m in enumerate(asked):
             for _ in range(number % 4):
@@ -107,17 +117,18 @@ def soft_stems(seed: int) -> Iterator[ScriptedStem]:
         yield stem
 
 
-def test_a_packing_that_gives_way_takes_small_moves_without_a_slide() -> None:
+@pytest.mark.parametrize("seed", SEEDS)
+def test_a_packing_that_gives_way_takes_small_moves_without_a_slide(seed: int) -> None:
     """Where it is tried the stem ends on its reference by that alone, in most moves."""
     ways = Counter[tuple[type, type]]()
-    for stem in islice(soft_stems(seed=7), 8):
+    for stem in soft_stems(seed=10 * seed + 7):
         for number, reference_m in enumerate(references(stem, 30)):
             stem.now_s += 10.0 * 3 ** (number % 2)  # no ramp
             stem.moved_to(reference_m)
             assert abs(stem.position_m - reference_m) < 1e-3 * STROKE_M
         ways.update(stem.states)
     begun = ways[Idle, Presliding]
-    assert begun > 25
+    assert begun > COUNT
     assert ways[Presliding, Idle] > 0.8 * begun
 
 

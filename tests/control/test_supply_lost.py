@@ -5,7 +5,7 @@ import pytest
 from config.codes import InhibitReason, Ne107Cause, Ne107Status
 from positioner.daemon.health import ne107_condition
 from tests.cases import few_always
-from tests.control.pneumatic_valve import AREA_M2, COULOMB_N, GOOD_PA, PRELOAD_N, SPRING_N_PER_M, Loop
+from tests.control.pneumatic_valve import AREA_M2, COULOMB_N, GOOD_PA, PRELOAD_N, SPRING_N_PER_M, Loop, identified
 from tests.control.virtual_loop import assert_static_law
 
 
@@ -35,7 +35,7 @@ def test_an_identification_waits_for_the_supply(lost_s: float, supply_pa: float)
 
 @pytest.mark.parametrize(("low_pu", "high_pu"), few_always([(0.5, 0.51), (0.3, 0.7)]))
 def test_a_move_waits_for_the_supply_and_lands_when_it_is_back(low_pu: float, high_pu: float) -> None:
-    loop = Loop().identified()
+    loop = identified()
     assert abs(loop.step_to(low_pu, 60.0)) < 1e-3
     loop.valve.supply_pa = 20e3
     loop.step_to(high_pu, 5.0)
@@ -55,7 +55,7 @@ def test_a_move_waits_for_the_supply_and_lands_when_it_is_back(low_pu: float, hi
 
 
 def test_a_stem_that_a_lost_supply_takes_away_comes_back_by_itself() -> None:
-    loop = Loop().identified()
+    loop = identified()
     assert abs(loop.step_to(0.6, 20.0)) < 1e-3
     loop.valve.supply_pa = 30e3
     loop.cycles(30.0)
@@ -75,7 +75,7 @@ def test_a_register_of_another_scale_is_no_lost_supply(scale: float) -> None:
 
 
 def test_a_pressure_sensor_that_stands_still_does_not_stop_the_stem() -> None:
-    loop = Loop().identified()
+    loop = identified()
     assert abs(loop.step_to(0.6, 20.0)) < 1e-3
     stands_pa = loop.valve.pressure_pa
     loop.valve.measured = lambda _actuator_pa: stands_pa
@@ -87,7 +87,7 @@ def test_a_pressure_sensor_that_stands_still_does_not_stop_the_stem() -> None:
 @pytest.mark.parametrize(("from_pu", "to_pu"), [(0.8, 0.5), (0.3, 0.6)])
 def test_the_seeds_law_returns_to_its_balance_whichever_way_the_stem_comes_back(from_pu: float, to_pu: float) -> None:
     """Its command hung on the last difference of the reference: a stem that came back the other way was 15 % off."""
-    loop = Loop(law="seed").identified()
+    loop = identified("seed")
     loop.step_to(from_pu, 20.0)
     before = loop.step_to(to_pu, 20.0)
     loop.valve.supply_pa = 30e3

@@ -2,6 +2,7 @@
 
 from collections.abc import Callable
 from dataclasses import replace
+from itertools import product
 
 import pytest
 
@@ -11,6 +12,7 @@ from config.slave_file import SlaveFile
 from config.valve_file import load_valve, shipped_valve
 from drivers.in_memory import Plant
 from positioner.control.controller_memory import Decision
+from sim.effect import FINE_STEP_S
 from sim.slave.simulated_device import Device
 from sim.valve import Valve
 from tests.cases import few_always
@@ -47,7 +49,7 @@ def identified(plant: Plant, maximum_pa: float) -> Decision:
 
 def seed_valve(factor: float, at_pu: float) -> Plant:
     file = load_valve(shipped_valve("seed"))
-    valve = Valve.from_file(file)
+    valve = Valve.from_file(file, step_s=FINE_STEP_S)
     valve.change(coulomb_n=factor * file.valve.coulomb_n, static_n=factor * file.valve.static_n)
     valve.rest_at(at_pu * STROKE_M, at_pu * STROKE_M * file.valve.spring_n_per_m / file.valve.diaphragm_area_m2)
     slave = {"clock": {"mode": "lockstep", "period_s": PERIOD_S}, "sensor": {"noise_std_m": 1e-4 * STROKE_M, "seed": 1}}
@@ -63,12 +65,12 @@ def other_valve(factor: float, at_pu: float) -> Plant:
     return OtherPlant(with_friction(SEED_LIKE, factor), PERIOD_S, at_pu=at_pu, noise_std_m=1e-5)
 
 
-@pytest.mark.parametrize("valve", [seed_valve, other_valve])
-@pytest.mark.parametrize("maximum_pa", [140e3, 420e3])
-@pytest.mark.parametrize(
-    ("factor", "at_pu"),
-    few_always([(2.0, 0.3), (2.0, 0.5), (2.0, 0.86), (2.5, 0.15), (2.5, 0.5), (1.0, 0.5), (1.5, 0.5)], 1),
-)
+FACTORS_AT = ((2.0, 0.3), (2.0, 0.5), (2.0, 0.86), (2.5, 0.15), (2.5, 0.5), (1.0, 0.5), (1.5, 0.5))
+FIRST = [(2.0, 0.3, 140e3, seed_valve), (2.0, 0.3, 420e3, other_valve)]
+REST = [(*each, *how) for each, *how in product(FACTORS_AT, (140e3, 420e3), (seed_valve, other_valve))]
+
+
+@pytest.mark.parametrize(("factor", "at_pu", "maximum_pa", "valve"), few_always([*FIRST, *REST], len(FIRST)))
 def test_friction_that_has_doubled_is_found(
     factor: float, at_pu: float, maximum_pa: float, valve: Callable[[float, float], Plant]
 ) -> None:

@@ -216,7 +216,7 @@ def test_the_dcs_reads_what_it_wrote_and_what_becomes_of_it() -> None:
 
 
 def hunting(dead_band: float | str) -> tuple[float, float]:
-    """Return the strokes that PI goes in half a minute about a reference that stands, and its dead band."""
+    """Return the strokes that PI goes in a quarter of a minute about a reference that stands, and its dead band."""
     tables = {
         "valve": {"stroke_m": 0.1016},
         "pressure": {"maximum_pa": 200e3},
@@ -236,7 +236,7 @@ def hunting(dead_band: float | str) -> tuple[float, float]:
     for _ in range(500):
         cycle.once()
     before_m = cycle.health.record.travel_m
-    for _ in range(1500):
+    for _ in range(750):
         cycle.once()
     return (cycle.health.record.travel_m - before_m) / 0.1016, cycle.snapshot.decision.dead_band_m / 0.1016
 
