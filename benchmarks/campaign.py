@@ -42,8 +42,8 @@ from positioner.daemon.pacing import DevicePace
 from positioner.daemon.snapshot import Snapshot
 from positioner.testing.wire_faults import Spoiler
 from sim.slave.clocks import Lockstep
-from sim.slave.modbus_slave import device_of
 from sim.slave.simulated_device import Device
+from sim.slave.slave import device_of
 
 MOST_OPENINGS = 5
 PERIOD_S, STALL_S, SILENCE_S = 2e-3, 2.0, 0.1

@@ -31,7 +31,7 @@ from positioner.daemon.pacing import DevicePace
 from positioner.daemon.recorder import Recorder
 from positioner.daemon.snapshot import Snapshot
 from positioner.virtual.virtual_cycle import Script, play_script, virtual_cycle
-from sim.slave.modbus_slave import device_of
+from sim.slave.slave import device_of
 
 STROKE_M = 0.1016
 DAEMON = DaemonFile.model_validate(

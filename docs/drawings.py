@@ -24,7 +24,7 @@ from positioner.control.requests import QUIET, Requests
 from positioner.control.settings import Settings
 from positioner.daemon.link import Link, LinkSettings
 from positioner.daemon.pacing import DevicePace
-from sim.slave.modbus_slave import device_of
+from sim.slave.slave import device_of
 
 PERIOD_S = 0.02
 IDENTIFIED_WITHIN_S = 400.0

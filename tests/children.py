@@ -22,7 +22,7 @@ END_WITHIN_S = 60.0
 FORKS = multiprocessing.get_context("forkserver")
 FORKS.set_forkserver_preload(
     [
-        "sim.slave.modbus_slave",
+        "sim.slave.slave",
         "sim.slave.canopen_slave",
         "positioner.daemon.service",
         "drivers.modbus_tcp",

@@ -17,7 +17,7 @@ from config.valve_file import load_valve, shipped_valve
 from positioner.control.requests import QUIET, Requests
 from positioner.control.settings import Settings
 from positioner.virtual.virtual_cycle import run_identification, virtual_cycle
-from sim.slave.modbus_slave import device_of
+from sim.slave.slave import device_of
 
 POSITIONERS = {"conventional": "conventional", "seed": "seed's law", "slides": "slides (ours)"}
 """The laws, and what they are called here."""

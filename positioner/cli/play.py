@@ -133,7 +133,7 @@ def _play_daemon(
     """Let the daemon identify the valve, or give it the extended one, and follow the reference."""
     from positioner.control.settings import Settings
     from positioner.virtual.virtual_cycle import play_script, run_identification, virtual_cycle
-    from sim.slave.modbus_slave import device_of
+    from sim.slave.slave import device_of
 
     daemon, slave = _files(arguments, valve)
     device = device_of(slave, path)

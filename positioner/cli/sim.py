@@ -28,12 +28,12 @@ def run(arguments: argparse.Namespace) -> int:
     Raises:
         InputError: a fault in a file, or the port is in use.
     """
-    from sim.slave.slave import slave_of
+    from sim.slave.slave import Slave
 
     ended: list[int] = []  # not an Event: a handler that sets one may deadlock with the wait it interrupts
     for number in (signal.SIGTERM, signal.SIGINT):
         signal.signal(number, lambda number, _frame: ended.append(number))
-    slave = slave_of(config_file(arguments), arguments.listen_port)
+    slave = Slave(config_file(arguments), arguments.listen_port)
     print(f"listening on {slave.address}", flush=True)
     while not ended:
         time.sleep(CATCH_UP_EVERY_S)

@@ -24,7 +24,7 @@ LOADED = (
     "positioner.daemon.service",
     "positioner.testing.agent",
     "drivers.modbus_tcp",
-    "sim.slave.modbus_slave",
+    "sim.slave.slave",
     "sim.slave.kernel_preloading",
 )
 CHILD_LOOK_EVERY_S = 0.005

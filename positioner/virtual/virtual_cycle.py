@@ -32,7 +32,7 @@ def virtual_cycle(
     settings: Settings | None = None,
     restored: ValveKnowledge | None = None,
 ) -> Cycle:
-    """Return a daemon's cycle that commands a device in memory, such as that of `sim.slave.modbus_slave`."""
+    """Return a daemon's cycle that commands a device in memory, such as that of `sim.slave.slave`."""
     return lockstep_cycle(daemon, MemoryDriver(device), requests, settings, restored)
 
 

@@ -2,11 +2,11 @@
 
 Its files:
 
-    slave                                     whichever bus a file names
+    slave                                     valve, device, clock and server, on whichever bus a file names
     simulated_device, clocks                  the I/P with position transmitter as pure logic; who lets its time pass
     faults                                    it drops, freezes, jumps and restarts, by its file
     device_registers                          laid out for Modbus
-    modbus_slave, rtu_server                  served on TCP; on a serial line
+    rtu_server                                served on a serial line
     canopen_dictionary, canopen_node          laid out for CANopen; the node as pure logic
     canopen_slave                             the node on its bus
     kernel_preloading                         what takes a slave the longest to load, for one that is forked

@@ -1,19 +1,15 @@
-"""The simulated slave on CANopen: valve, device, clock, node and bus put together from its file."""
+"""The simulated node on its CAN bus."""
 
 import time
 from contextlib import suppress
-from pathlib import Path
 from threading import Event, Lock, Thread
 
 from config.canopen_device import SHIPPED_EDS, CanBus
 from config.errors import InputError
-from config.slave_file import CanopenBus, load_slave, valve_path
 from fieldbus.canopen.eds import read_eds
-from fieldbus.canopen.loopback import free_channel
 from fieldbus.canopen.python_can import can
 from sim.slave.canopen_node import CanopenNode
-from sim.slave.clocks import Clock, clock_of
-from sim.slave.modbus_slave import device_of
+from sim.slave.clocks import Clock
 from sim.slave.simulated_device import Device
 
 LISTEN_S = 0.2
@@ -97,36 +93,3 @@ class NodeServer:
         """Put a frame on the bus."""
         with suppress(can.CanError):  # a master notices what is missing
             self._bus.send(can.Message(arbitration_id=identity, data=data, is_extended_id=False))
-
-
-class CanopenSlave:
-    """A simulated slave, a node of its bus as soon as it is made.
-
-    Args:
-        path: the slave file.
-        port: another channel of the loopback than the file's; 0 takes any free one.
-
-    Raises:
-        InputError: a fault in the slave file or its valve file, the bus cannot be opened, or the node id is taken.
-    """
-
-    def __init__(self, path: Path, port: int | None = None) -> None:
-        file = load_slave(path)
-        bus = file.bus
-        assert isinstance(bus, CanopenBus)
-        if port is not None:
-            bus = bus.model_copy(update={"channel": free_channel() if port == 0 else str(port)})
-        device = device_of(file, valve_path(file, path))
-        self._clock = clock_of(file, device)
-        self._server = NodeServer(bus, device, self._clock, str(path))
-        self._server.start()
-        self.address = self._server.address
-
-    def catch_up(self) -> None:
-        """Let the time pass that is due; call it often enough that no SYNC has much to catch up."""
-        with self._server.lock:
-            self._clock.catch_up()
-
-    def stop(self) -> None:
-        """Leave the bus."""
-        self._server.stop()

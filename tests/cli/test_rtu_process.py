@@ -14,7 +14,7 @@ from positioner.cli.main import main
 from positioner.cli.parts.children import port_in
 from positioner.cli.parts.pseudo_line import pseudo_line
 from positioner.dcs import Dcs
-from sim.slave.slave import slave_of
+from sim.slave.slave import Slave
 from tests.children import ended, running
 from tests.daemon_files import LAW
 from tests.waiting import until
@@ -85,7 +85,7 @@ def test_bad_input_is_one_line_and_status_2(line: Line, tmp_path: Path) -> None:
         (tmp_path / name).write_text(text)
     for name, words in said.items():
         with pytest.raises(InputError) as caught:
-            slave_of(tmp_path / name, 0 if name == "port.toml" else None)
+            Slave(tmp_path / name, 0 if name == "port.toml" else None)
         assert words in str(caught.value)
         assert "\n" not in str(caught.value)
     done = ended("run", tmp_path / "daemon.toml")

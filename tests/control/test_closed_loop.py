@@ -21,7 +21,7 @@ from positioner.control.requests import QUIET, Requests
 from positioner.control.sample import Sample
 from positioner.control.settings import Settings
 from positioner.virtual.virtual_cycle import virtual_cycle
-from sim.slave.modbus_slave import device_of
+from sim.slave.slave import device_of
 from tests.cases import few_always
 
 VALVE = load_valve(shipped_valve("seed")).valve

@@ -22,7 +22,7 @@ from positioner.control.settings import Settings
 from positioner.daemon.snapshot import Snapshot
 from positioner.estimation.refiner import Refinement
 from positioner.virtual.virtual_cycle import play_script, virtual_cycle
-from sim.slave.modbus_slave import device_of
+from sim.slave.slave import device_of
 from tests.cases import few_always
 
 STROKE_M = 0.1016

@@ -21,7 +21,7 @@ from positioner.control.travel.signal_path import SignalPath
 from positioner.estimation.acceptance import Ratios
 from positioner.estimation.estimates import Estimate, no_estimate
 from positioner.virtual.virtual_cycle import run_identification, virtual_cycle
-from sim.slave.modbus_slave import device_of
+from sim.slave.slave import device_of
 from tests.daemon.panel import Panel
 
 POINTS = [[0.0, 0.02], [0.3, 0.05], [0.31, 0.6], [1.0, 0.98]]

@@ -16,7 +16,7 @@ from positioner.control.travel.signal_path import SignalPath
 from positioner.daemon.cycle import Cycle
 from positioner.daemon.supervisory_registers import SupervisoryRegisters
 from positioner.virtual.virtual_cycle import virtual_cycle
-from sim.slave.modbus_slave import device_of
+from sim.slave.slave import device_of
 
 STROKE_M = 0.1016
 LAW = {"b_over_c_pa_per_m": -814e3, "k_over_c_pa": -22e3}

@@ -15,7 +15,7 @@ from positioner.control.requests import Requests
 from positioner.daemon.memory.known_configuration import conditions_of
 from positioner.daemon.supervisory_registers import SupervisoryRegisters
 from positioner.virtual.virtual_cycle import run_identification, virtual_cycle
-from sim.slave.modbus_slave import device_of
+from sim.slave.slave import device_of
 
 PROFILES = SHIPPED / "profiles"
 

@@ -25,7 +25,7 @@ from positioner.cli.parts.children import port_in
 from positioner.dcs import Dcs
 from sim.slave.clocks import Lockstep
 from sim.slave.device_registers import DeviceRegisters
-from sim.slave.modbus_slave import device_of
+from sim.slave.slave import device_of
 from tests.children import running
 
 pytestmark = pytest.mark.real_time

@@ -39,8 +39,8 @@ from positioner.daemon.recorder import Recorder
 from positioner.dcs import Dcs, DcsError
 from sim.slave.clocks import Lockstep
 from sim.slave.device_registers import DeviceRegisters
-from sim.slave.modbus_slave import device_of
 from sim.slave.simulated_device import Device
+from sim.slave.slave import device_of
 from tests.children import running
 from tests.waiting import until
 

@@ -23,7 +23,7 @@ from positioner.daemon.recorder import Recorder
 from positioner.daemon.snapshot import Snapshot
 from positioner.estimation.refiner import InProcessRefiner
 from positioner.virtual.virtual_cycle import play_script, virtual_cycle
-from sim.slave.modbus_slave import device_of
+from sim.slave.slave import device_of
 from tests.children import running
 
 STROKE_M = 0.1016

@@ -11,8 +11,8 @@ from fieldbus.canopen.loopback import free_channel
 from sim.slave import canopen_slave
 from sim.slave.canopen_slave import NodeServer
 from sim.slave.clocks import Lockstep
-from sim.slave.modbus_slave import device_of
 from sim.slave.simulated_device import Device
+from sim.slave.slave import device_of
 from tests.drivers.test_driver_contract import FILE, Bench, WireBench, WireContract
 
 pytestmark = pytest.mark.real_time

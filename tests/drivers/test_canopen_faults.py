@@ -27,7 +27,7 @@ from fieldbus.canopen.objects import NodeState
 from sim.slave import canopen_slave
 from sim.slave.canopen_slave import NodeServer
 from sim.slave.clocks import Clock, Lockstep, RealTime
-from sim.slave.modbus_slave import device_of
+from sim.slave.slave import device_of
 from tests.recovery import taken_up
 
 pytestmark = pytest.mark.real_time

@@ -26,8 +26,8 @@ from fieldbus.modbus.server import RegisterServer
 from fieldbus.modbus.tls import Guard
 from sim.slave.clocks import Lockstep
 from sim.slave.device_registers import DeviceRegisters
-from sim.slave.modbus_slave import device_of
 from sim.slave.simulated_device import Device
+from sim.slave.slave import device_of
 from tests.recovery import opened
 
 pytestmark = pytest.mark.real_time

@@ -20,7 +20,7 @@ from drivers.modbus_tcp import ModbusTcpDriver
 from fieldbus.modbus.server import RegisterServer
 from sim.slave.clocks import Lockstep
 from sim.slave.device_registers import DeviceRegisters
-from sim.slave.modbus_slave import device_of
+from sim.slave.slave import device_of
 from tests.recovery import taken_up
 from tests.refusals import refusal_of
 

@@ -28,9 +28,9 @@ from fieldbus.modbus.serial_line import SerialLine
 from positioner.cli.parts.pseudo_line import pseudo_line
 from sim.slave.clocks import Lockstep
 from sim.slave.device_registers import DeviceRegisters
-from sim.slave.modbus_slave import device_of
 from sim.slave.rtu_server import RtuServer
 from sim.slave.simulated_device import Device
+from sim.slave.slave import device_of
 from tests.drivers.test_driver_contract import FILE, WireBench, WireContract
 from tests.recovery import taken_up
 from tests.refusals import refusal_of

@@ -31,7 +31,7 @@ from fieldbus.modbus.tls import Guard
 from positioner.cli.parts.pseudo_line import pseudo_line
 from sim.slave.clocks import Lockstep
 from sim.slave.device_registers import DeviceRegisters
-from sim.slave.modbus_slave import device_of
+from sim.slave.slave import device_of
 from tests.certificates import tls
 from tests.drivers.test_modbus_rtu import ScriptedDevice
 

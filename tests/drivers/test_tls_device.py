@@ -32,8 +32,8 @@ from fieldbus.modbus.server import RegisterServer
 from fieldbus.modbus.tls import Guard, client_context, failure_reason
 from sim.slave.clocks import Lockstep
 from sim.slave.device_registers import DeviceRegisters
-from sim.slave.modbus_slave import device_of
 from sim.slave.simulated_device import Device
+from sim.slave.slave import device_of
 from tests.certificates import folder, revoke, tls
 from tests.drivers import test_driver_contract as contract
 from tests.recovery import opened

@@ -28,8 +28,8 @@ from fieldbus.modbus.rtu import framed, is_whole
 from sim.slave.canopen_node import CanopenNode
 from sim.slave.clocks import Lockstep
 from sim.slave.device_registers import DeviceRegisters
-from sim.slave.modbus_slave import device_of
 from sim.slave.rtu_server import RtuServer
+from sim.slave.slave import device_of
 from tests.daemon.panel import Panel
 from tests.fuzz.parser import Broken, Parser, refused_in_one_line
 from tests.fuzz.wires import Bytes, HeardLine, SpoiltBus, SpoiltLine, SpoiltSocket

@@ -14,8 +14,8 @@ from fieldbus.canopen.eds import PRODUCT_NUMBER, VENDOR_NUMBER, read_eds
 from fieldbus.canopen.objects import ACTIVATE, Control, NodeState
 from sim.slave.canopen_node import NO_TRANSFER, CanopenNode, DeviceStateMachine, Nmt
 from sim.slave.clocks import Clock, Lockstep, RealTime
-from sim.slave.modbus_slave import device_of
 from sim.slave.simulated_device import Device
+from sim.slave.slave import device_of
 
 pytestmark = pytest.mark.real_time
 

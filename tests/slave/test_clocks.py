@@ -8,8 +8,8 @@ import pytest
 from config.slave_file import SlaveFile
 from config.valve_file import shipped_valve
 from sim.slave.clocks import Lockstep, RealTime
-from sim.slave.modbus_slave import device_of
 from sim.slave.simulated_device import Device
+from sim.slave.slave import device_of
 
 
 def switched_on(**tables: Any) -> Device:

@@ -15,8 +15,8 @@ from fieldbus.modbus.client import ModbusClient
 from fieldbus.modbus.server import RegisterServer
 from sim.slave.clocks import Lockstep, RealTime
 from sim.slave.device_registers import DeviceRegisters
-from sim.slave.modbus_slave import device_of
 from sim.slave.simulated_device import Device
+from sim.slave.slave import device_of
 from tests.independent import independent_client
 
 pytestmark = pytest.mark.real_time

@@ -27,7 +27,7 @@ from positioner.daemon.health.valve_health import HealthSettings
 from positioner.daemon.supervisory_registers import SupervisoryRegisters
 from positioner.estimation.acceptance import Applied, Ratios
 from positioner.virtual.virtual_cycle import virtual_cycle
-from sim.slave.modbus_slave import device_of
+from sim.slave.slave import device_of
 from tests.cases import few_always
 
 STROKE_M = 0.1016
