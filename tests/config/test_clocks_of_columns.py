@@ -246,5 +246,13 @@ def test_of_two_clocks_that_contradict_each_other_the_finer_is_not_proposed(tmp_
         assert ("time_s=Time_ms:ud" in preview(tmp_path / "b.csv").words) == finer
 
 
+def test_what_stands_where_a_clock_has_its_unit_is_said_with_what_is_taken(tmp_path: Path) -> None:
+    """A scope's labels stand under its clocks: no unit that is known, and not an empty one."""
+    lines = (f"{1e3 * t:.1f}\t{x}\t{x / 50}" for t, x in zip(STEM_S, STEM_MM, strict=True))
+    (tmp_path / "a.csv").write_text("\n".join(["Name\txStem\tuCmd", "SymbolName\tmm\tbar", *lines]))
+    (said,) = preview(tmp_path / "a.csv").proposal.open
+    assert said.startswith("the unit of 'Name' is 'SymbolName' by the file, none known: s is taken; :ms")
+
+
 def day(times_s: np.ndarray) -> list[str]:
     return [(BEGIN + datetime.timedelta(seconds=float(t))).strftime("%d.%m.%Y %H:%M:%S") for t in times_s]

@@ -70,8 +70,9 @@ def proposal(columns: Sequence[ColumnPreview], separator: str) -> Proposal:
         if ours == "time_s":
             chosen = _whole_clock(chosen, left)
         unit, doubt = _unit_of(name, chosen, decimal)
-        if doubt and chosen.unknown and unit.removeprefix(":") not in {volts for volts, *_ in VOLTS}:
-            doubt = [f"the unit of {chosen.name!r} is {chosen.unknown!r} by the file, none known; {unit} is a guess"]
+        if chosen.unknown:
+            is_open, said = f"{chosen.name!r} is open", f"{chosen.name!r} is {chosen.unknown!r} by the file, none known"
+            doubt = [each.replace(is_open, said) for each in doubt]
         mapped.append(f"{name}={chosen.name}{unit}")
         open_ += doubt
         if ours == "time_s" and not chosen.numbers:
