@@ -4,8 +4,9 @@ One cycle is one `exchange`: the command goes out, the measurement of the same t
 never retries and never repeats an old measurement: what it cannot get it raises.
 """
 
+from collections.abc import Mapping
 from dataclasses import dataclass
-from typing import Protocol, runtime_checkable
+from typing import Protocol, Self, runtime_checkable
 
 
 @dataclass(frozen=True, slots=True)
@@ -20,6 +21,19 @@ class Reading:
     status: int = 0
     emergency: int = 0
     """The device's own code of what is wrong with it, where it has such (CANopen: of the last EMCY); 0: nothing."""
+
+    @classmethod
+    def of(cls, values: Mapping[str, float], status: int = 0, emergency: int = 0) -> Self:
+        """Return the reading of a sample's quantities, by their names."""
+        counter, time_us = values.get("sample_counter"), values.get("device_time_us")
+        return cls(
+            position_m=values["position_m"],
+            pressure_pa=values.get("pressure_pa"),
+            sample_counter=None if counter is None else round(counter),
+            device_time_s=None if time_us is None else time_us / 1e6,
+            status=status,
+            emergency=emergency,
+        )
 
 
 @dataclass(frozen=True, slots=True)

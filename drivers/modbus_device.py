@@ -233,14 +233,7 @@ class ModbusDriver(ABC):
         if not all(map(math.isfinite, said.values())):
             values = ", ".join(f"{name} {value}" for name, value in said.items())
             raise NoNumber(f"{self._who}: a measurement that is no number: {values}")
-        counter, time_us = said.get("sample_counter"), said.get("device_time_us")
-        return Reading(
-            position_m=said["position_m"],
-            pressure_pa=said.get("pressure_pa"),
-            sample_counter=None if counter is None else round(counter),
-            device_time_s=None if time_us is None else time_us / 1e6,
-            status=self._config.map.device_status(round(said.get("status", 0))),
-        )
+        return Reading.of(said, self._config.map.device_status(round(said.get("status", 0))))
 
     def _ask(self, request: bytes, head: bytes, length: int) -> bytes:
         """Return what follows `head` in the reply, which must begin with it and have that length."""

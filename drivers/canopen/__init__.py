@@ -6,7 +6,7 @@
     found_pdos            PDOs used as the node has them
     watcher, events       heartbeats, boot-up, emergencies; what can happen
     activation            the device states of CiA 408
-    readings, node_bus    what the boundary gets of the node; the node's frames
+    node_bus              the node's frames
 
 Both drivers stand on all the others.
 """

@@ -26,7 +26,6 @@ from drivers.canopen.activation import Activation
 from drivers.canopen.events import NodeEvent
 from drivers.canopen.node_bus import EMERGENCY, HEARTBEAT, NMT, SDO_ANSWER
 from drivers.canopen.only_watch import NodeDriver, WatchingDriver
-from drivers.canopen.readings import reading_of
 from drivers.canopen.sdo import ILLEGAL_VALUE, Setting
 from fieldbus.canopen.objects import HOLDING, LOCAL, STATE_BITS, NodeState, inactive_because
 
@@ -196,13 +195,13 @@ class CanopenDriver(NodeDriver):
             self.bus.send(HEARTBEAT + master, OPERATIONAL)
 
     def _reading(self, values: Mapping[str, float]) -> Reading:
-        unfit = 0
+        status = round(values.get("status", 0))
         if "status_word" in values:
             self._activation.update(round(values["status_word"]))
-            unfit = 0 if self._activation.is_active else DeviceStatus.NOT_READY
+            status |= 0 if self._activation.is_active else DeviceStatus.NOT_READY
         if self._watcher.is_unfit:
-            unfit |= DeviceStatus.DEVICE_FAULT
-        return replace(reading_of(values, unfit), emergency=self._watcher.emergency)
+            status |= DeviceStatus.DEVICE_FAULT
+        return Reading.of(values, status, self._watcher.emergency)
 
     def _refused(self, said: str) -> Refused:
         return Refused(f"{self.bus.who}: {NodeEvent.COMMAND_REFUSED}: {said}", ILLEGAL_VALUE)

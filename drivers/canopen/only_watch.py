@@ -9,7 +9,6 @@ from drivers.canopen.configuration import NodeConfiguration
 from drivers.canopen.events import NodeEvent
 from drivers.canopen.node_bus import SDO_ANSWER, NodeBus
 from drivers.canopen.pdo import PdoExchange
-from drivers.canopen.readings import capabilities_of, reading_of
 from drivers.canopen.sdo import ILLEGAL_VALUE, SdoTransfers, device_sheet
 from drivers.canopen.watcher import NodeWatcher
 
@@ -36,7 +35,11 @@ class NodeDriver:
     @property
     def capabilities(self) -> Capabilities:
         """What the device can do."""
-        return capabilities_of(self._config)
+        return Capabilities(
+            one_transaction=not self._config.only_watch,
+            device_time=self._config.map.device_time_us is not None,
+            sample_counter=self._config.map.sample_counter is not None,
+        )
 
 
 class WatchingDriver(NodeDriver):
@@ -64,7 +67,8 @@ class WatchingDriver(NodeDriver):
             DriverError: an object could not be read.
         """
         sampled = self._config.map.sampled
-        return reading_of({name: self.sdo.get(entry) for name, entry in sampled.items()})
+        values = {name: self.sdo.get(entry) for name, entry in sampled.items()}
+        return Reading.of(values, round(values.get("status", 0)))
 
     def write(self, command_pa: float) -> None:
         """Command nothing.
