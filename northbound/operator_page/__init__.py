@@ -9,7 +9,7 @@ Its files:
     page                    the page of one tab: all valves, or one in full
     overview, valve_panel   a card a valve; all of one
     status_marks            how things are stressed: grey, NE 107, a fault
-    charts                  what the charts share
+    echart_options          what the charts share
     trend_plot              reference, position and pressure as they come, the states as bands
     recorded_plot           the last minutes as recorded, to zoom into
     friction_plot           friction against its baseline

@@ -8,7 +8,7 @@ from typing import Any
 from nicegui import ui
 
 from config.codes import AlarmState
-from northbound.observer.alarms import SeenAlarm, alarms
+from northbound.observer.seen_alarms import SeenAlarm, alarms
 from northbound.observer.valve_commands import Confirmation, ValveCommands, refusal_for
 from northbound.observer.valve_view import ValvePicture
 from northbound.operator_page.signed_in import SignedIn

@@ -5,7 +5,7 @@ import time
 from nicegui import ui
 
 from northbound.observer.valve_view import ValveView
-from northbound.operator_page.charts import Options, chart_options, line, quiet
+from northbound.operator_page.echart_options import Options, chart_options, line, quiet
 from webpage.theme import Theme
 from webpage.units import Units
 

@@ -11,7 +11,7 @@ from nicegui import events, ui
 
 from config.recording import Column, Recording
 from northbound.observer.trends import thin_columns
-from northbound.operator_page.charts import Options, axis_title, chart_options, line, quiet
+from northbound.operator_page.echart_options import Options, axis_title, chart_options, line, quiet
 from webpage.theme import Theme
 from webpage.units import Unit, Units
 

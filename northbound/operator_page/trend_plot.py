@@ -16,7 +16,7 @@ from config.codes import State
 from config.recording import Column
 from northbound.observer.trends import WAITING, bands, thin_columns
 from northbound.observer.valve_view import ValveView
-from northbound.operator_page.charts import Options, axis_title, chart_options, line
+from northbound.operator_page.echart_options import Options, axis_title, chart_options, line
 from webpage.theme import Theme
 from webpage.units import Unit, Units
 

@@ -28,7 +28,7 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
 def run(arguments: argparse.Namespace) -> int:
     """Do what is asked for, then print the alarms; exit status 1 while one is unacknowledged."""
 
-    from northbound.observer.alarms import ALARM_READS, alarms
+    from northbound.observer.seen_alarms import ALARM_READS, alarms
 
     wanted = {name: _cause(getattr(arguments, name)) for name in ("shelve", "unshelve") if getattr(arguments, name)}
     if arguments.acknowledge not in (None, "all"):

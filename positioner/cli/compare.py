@@ -4,8 +4,8 @@ import argparse
 from pathlib import Path
 
 from positioner.cli.parts.fit_arguments import add_noise_and_exports, read_with_noise
+from positioner.cli.parts.given_names import naming
 from positioner.cli.parts.model_arguments import read_valve
-from positioner.cli.parts.naming import naming
 from positioner.cli.parts.output_files import write_json
 from positioner.cli.parts.progress import at_work
 

@@ -11,8 +11,8 @@ from typing import TYPE_CHECKING
 from config.errors import CommandFailed, InputError
 from positioner.cli.parts.export_arguments import mapping_of
 from positioner.cli.parts.fit_arguments import add_noise_and_exports, add_pressure, add_test, read_fitted
+from positioner.cli.parts.given_names import files_named, naming
 from positioner.cli.parts.model_arguments import read_valve, require_effects
-from positioner.cli.parts.naming import files_named, naming
 from positioner.cli.parts.next_step import by_pressure_command, discover_command, extend_commands, not_written
 from positioner.cli.parts.output_files import writable, write_json
 from positioner.cli.parts.progress import Progress, at_work

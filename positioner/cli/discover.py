@@ -6,8 +6,8 @@ from typing import TYPE_CHECKING
 
 from config.errors import InputError
 from positioner.cli.parts.fit_arguments import add_noise_and_exports, add_pressure, add_test, read_fitted
+from positioner.cli.parts.given_names import files_named, naming
 from positioner.cli.parts.model_arguments import read_valve
-from positioner.cli.parts.naming import files_named, naming
 from positioner.cli.parts.next_step import extend_command
 from positioner.cli.parts.output_files import writable, write_json, write_text
 from positioner.cli.parts.progress import at_work

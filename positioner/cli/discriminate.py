@@ -10,8 +10,8 @@ from positioner.cli.parts.breaking_off import end_as_by_ctrl_c, tell_when_broken
 from positioner.cli.parts.config_argument import add_config, config_file
 from positioner.cli.parts.daemon_address import add_tls
 from positioner.cli.parts.fit_arguments import add_pressure, add_test
+from positioner.cli.parts.given_names import naming
 from positioner.cli.parts.model_arguments import read_valve, require_effects
-from positioner.cli.parts.naming import naming
 from positioner.cli.parts.output_files import make_folder, write_json
 from positioner.cli.parts.progress import Progress
 

@@ -12,7 +12,7 @@ from typing import TYPE_CHECKING
 from config.errors import CommandFailed, InputError
 from positioner.cli.parts.config_argument import add_config, config_file
 from positioner.cli.parts.extended_valves import load_extended_valve
-from positioner.cli.parts.sampling import when_shown
+from positioner.cli.parts.sampling_order import when_shown
 from positioner.daemon.platform_needs import goes_without, require_platform
 
 if TYPE_CHECKING:

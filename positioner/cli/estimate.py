@@ -6,7 +6,7 @@ from typing import TYPE_CHECKING, Any
 
 from config.registers import ESTIMATED
 from positioner.cli.parts.export_arguments import add_export_arguments, read_any
-from positioner.cli.parts.naming import naming
+from positioner.cli.parts.given_names import naming
 from positioner.cli.parts.output_files import write_json
 from positioner.cli.parts.progress import at_work
 

@@ -5,8 +5,8 @@ import time
 from pathlib import Path
 
 from positioner.cli.parts.fit_arguments import add_noise_and_exports, add_pressure, add_test, read_fitted
+from positioner.cli.parts.given_names import files_named, naming
 from positioner.cli.parts.model_arguments import read_valve, require_effects
-from positioner.cli.parts.naming import files_named, naming
 from positioner.cli.parts.output_files import writable, write_json
 from positioner.cli.parts.progress import at_work
 

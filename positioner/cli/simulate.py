@@ -3,8 +3,8 @@
 import argparse
 from pathlib import Path
 
+from positioner.cli.parts.given_names import naming
 from positioner.cli.parts.model_arguments import read_valve
-from positioner.cli.parts.naming import naming
 from positioner.cli.parts.output_files import recording_writable
 from positioner.cli.parts.progress import at_work
 

@@ -4,8 +4,8 @@ import argparse
 from pathlib import Path
 
 from config.errors import InputError
+from positioner.cli.parts.given_names import naming
 from positioner.cli.parts.model_arguments import read_valve, require_parameters
-from positioner.cli.parts.naming import naming
 from positioner.cli.parts.output_files import writable
 
 HELP = "write a valve file from a data sheet; prints what it assumes"

@@ -16,8 +16,8 @@ from config.arguments import kinds_held
 from config.drive import Scale
 from config.plausibility import odd_sizes
 from config.recording import Column, Recording
-from positioner.response.dead_band import dead_band_and_resolution
 from positioner.response.figure import Figure, no_value
+from positioner.response.measured_dead_band import dead_band_and_resolution
 from positioner.response.response_result import ResponseFigures
 from positioner.response.step_detection import StepChange, find_steps
 from positioner.response.step_figures import FIGURES, StepFigures, figures_of

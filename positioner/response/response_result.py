@@ -7,8 +7,8 @@ from typing import TYPE_CHECKING
 
 from config.results.block import Block, Table
 from config.results.result import Result
-from positioner.response.dead_band import follows_step
 from positioner.response.figure import Figure
+from positioner.response.measured_dead_band import follows_step
 from positioner.response.step_figures import FIGURES, StepFigures
 
 if TYPE_CHECKING:

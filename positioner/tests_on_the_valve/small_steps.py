@@ -6,7 +6,7 @@
     again       both, from the other side
 
 Each step is held, so that the stem rests when the next comes. What did not move it and what did bracket each figure
-(`positioner.response.dead_band`); step responses (T63, T86) are those of the steps that did.
+(`positioner.response.measured_dead_band`); step responses (T63, T86) are those of the steps that did.
 """
 
 from dataclasses import dataclass
@@ -15,8 +15,8 @@ from statistics import median
 from config.codes import ValveTestVerdict
 from config.errors import InputError
 from config.recording import Column, Recording
-from positioner.response.dead_band import follows_step
 from positioner.response.figure import Figure, no_value
+from positioner.response.measured_dead_band import follows_step
 from positioner.response.response_figures import respond
 from positioner.tests_on_the_valve.outcome import Curve, Outcome, Picture, Quantity
 from positioner.tests_on_the_valve.program import Bounds, Leap, Program, ramped, require_within

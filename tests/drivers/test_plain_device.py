@@ -16,7 +16,7 @@ from config.modbus_map import ActionCodes, ModbusMap, Place, StatusBits
 from config.quantities import DeviceStatus
 from drivers import driver_for
 from fieldbus.modbus import client as modbus_client
-from positioner.cli.parts.sampling import when_shown
+from positioner.cli.parts.sampling_order import when_shown
 from positioner.control.settings import Settings
 from positioner.daemon.link import SETTINGS_EVERY, Link, LinkSettings
 from positioner.daemon.pacing import RealTimePace

@@ -3,7 +3,7 @@
 import pytest
 
 from config.codes import Fault, Ne107Cause
-from northbound.observer.alarms import alarms
+from northbound.observer.seen_alarms import alarms
 
 BIT = float(1 << (Ne107Cause.FAULT - 1))
 

@@ -27,8 +27,8 @@ from workbench.discover.added_force import landings
 from workbench.discover.curve import curve_of, has_curve
 from workbench.discover.discovery import discover
 from workbench.discover.form_file import form_text, write_forms
+from workbench.discover.form_proposal import propose_forms
 from workbench.discover.grammar import FORMS, Form
-from workbench.discover.proposal import propose_forms
 from workbench.fit.fitting import base_fit
 from workbench.fit.problem import problem
 

@@ -7,6 +7,6 @@ Its files:
     grammar                      which forms there are: a place, a variable, a shape
     form_file                    a form as an effect's file
     curve                        a form with a free shape, where its own does not suffice
-    proposal                     which forms are tried first
+    form_proposal                which forms are tried first
     added_force                  the force that a form adds, over its variable; what the landings miss
 """

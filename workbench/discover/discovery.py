@@ -1,7 +1,7 @@
 """Discover: the form of an effect that nobody has written down. A form, not a cause.
 
 The valve is fitted as it is. If that leaves nothing to explain, no form is sought. Else forms of the grammar are
-ranked (`proposal`) and fitted one beside another, as effects' files, by the machinery of a diagnosis: the same
+ranked (`form_proposal`) and fitted one beside another, as effects' files, by the machinery of a diagnosis: the same
 likelihood, the same rule on what was held out, the same floor. A form is believed only if it passes that rule and
 leaves nothing to explain: a falling error alone proves nothing, of many forms less than of few. What does as well
 stands beside it.

@@ -17,9 +17,9 @@ from workbench.data.held_out import Split
 from workbench.discover.added_force import variable_range
 from workbench.discover.curve import curve_of, has_curve
 from workbench.discover.form_file import write_forms
+from workbench.discover.form_proposal import Point, propose_forms
 from workbench.discover.found_form import FoundForm
 from workbench.discover.grammar import FORMS, Form
-from workbench.discover.proposal import Point, propose_forms
 from workbench.fit.fit_result import Fit
 from workbench.fit.fitting import effect_fit, problem_of
 from workbench.fit.problem import Problem

@@ -24,7 +24,7 @@ From the file to the recording:
     time_stamps                             dates and times as seconds
     time_order                              newest first, disorder, repeated rows and hours
     own_format                              whether it is a recording of our own already
-    column_names, proposal                  what columns are called, by language and trade; words that may read them
+    column_names, column_proposal           what columns are called, by language and trade; words that may read them
     control_loop                            whether it is a loop's, OP, PV and SP, and tells of no stem
     loop_reader                             a loop read: time, OP, PV, SP and mode
     column_preview, export_preview          what a file holds, looked at by the code that reads it

@@ -15,10 +15,10 @@ from workbench.imports.column_preview import (
     read_header,
     show_cell,
 )
+from workbench.imports.column_proposal import Proposal, is_clock, proposal, quote_word
 from workbench.imports.control_loop import LoopColumn, LoopColumns, loops_of
 from workbench.imports.file_kind import raw_tables
 from workbench.imports.header_search import SHOWN, Header
-from workbench.imports.proposal import Proposal, is_clock, proposal, quote_word
 from workbench.imports.raw_table import RawTable
 
 FIRST_CELLS = 3

@@ -17,11 +17,11 @@ from workbench.imports.cell_kinds import may_be_clock, numbers_of
 from workbench.imports.cell_units import UNITS, with_any_unit
 from workbench.imports.clock_groups import find_groups
 from workbench.imports.column_clock import clock_of
+from workbench.imports.column_proposal import is_clock
 from workbench.imports.control_loop import LEAST_OUT, MOST_OUT, LoopColumns, loop_by_names, stem_by_name
 from workbench.imports.export_preview import ExportPreview, preview
 from workbench.imports.file_kind import raw_tables
 from workbench.imports.number_notation import decimal_sign
-from workbench.imports.proposal import is_clock
 from workbench.imports.raw_table import Cell
 from workbench.imports.sample_rows import Samples, collect_samples
 from workbench.imports.time_order import in_order

@@ -8,7 +8,7 @@ A command imports from here what it needs when it runs.
     daemon_address, experiment_player           where a daemon is; experiments played on its valve
     valve_test, own_valve                       what tests on the valve share; a valve on a cycle of the command's own
     hidden_demo                                 `demo --hidden`: an effect found in the daemon's own recording
-    csv_series, export_arguments, naming        series, historian's exports, and names of files in messages
+    csv_series, export_arguments, given_names   series, historian's exports, and names of files in messages
     fit_arguments                               what judges, noise, measured pressure; the recordings read so
     loop_arguments                              the columns of a control loop
     model_arguments                             a valve file and effects, checked before the work begins
@@ -16,7 +16,7 @@ A command imports from here what it needs when it runs.
     extended_valves                             `[law] valve` of a daemon's file, worked out
     config_argument                             which file a command is about
     output_files                                what `--out` and `--json` ask for
-    sampling                                    when a device samples, for `doctor --nudge-pa`
+    sampling_order                              when a device samples, for `doctor --nudge-pa`
     trial_authority, progress, passing_line     a test certificate authority; progress on a terminal, in one line there
     clone_only                                  what a command finds in a clone of the project alone
     breaking_off                                Ctrl-C during long work: what is known is said

@@ -4,8 +4,8 @@ import argparse
 import time
 
 from config.errors import InputError
+from positioner.cli.parts.given_names import naming
 from positioner.cli.parts.model_arguments import read_valve
-from positioner.cli.parts.naming import naming
 from positioner.cli.parts.output_files import write_json
 
 

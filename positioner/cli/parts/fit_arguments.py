@@ -9,7 +9,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING
 
 from positioner.cli.parts.export_arguments import add_export_arguments, read_any
-from positioner.cli.parts.naming import naming
+from positioner.cli.parts.given_names import naming
 
 if TYPE_CHECKING:
     from config.recording import Recording

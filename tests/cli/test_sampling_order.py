@@ -11,8 +11,8 @@ from config.daemon_file import DaemonFile
 from config.errors import CommandFailed
 from drivers.boundary import Capabilities, NoConnection, NoReply, Reading
 from positioner.cli import doctor, probe
-from positioner.cli.parts import sampling
-from positioner.cli.parts.sampling import SETTLE, Shown, when_shown
+from positioner.cli.parts import sampling_order
+from positioner.cli.parts.sampling_order import SETTLE, Shown, when_shown
 
 HELD_PA, NUDGE_PA = 50e3, 500.0
 
@@ -57,7 +57,7 @@ def test_a_slow_converter_is_waited_for_however_often_the_device_answers() -> No
 
 
 def test_it_waits_for_no_longer_than_it_says(monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setattr(sampling, "WITHIN_S", 0.0)
+    monkeypatch.setattr(sampling_order, "WITHIN_S", 0.0)
     driver = Slow(5000)
     with pytest.raises(CommandFailed, match="does not show a change of 500 Pa within 0 s"):
         when_shown(driver, HELD_PA, NUDGE_PA)  # type: ignore[arg-type]
