@@ -30,6 +30,8 @@ LAWS = {"seed": 44e3, "slides": 0.0}
 """With what alpha, Pa, each is identified: by a sine, or by slides, which ask for none."""
 Inputs = Sequence[tuple[Sample, Requests]]
 AHEAD, PERIOD_S = 60, 5e-3
+ASKED = (0.3, 0.5, 0.52)
+"""References, of the stroke: the law of slides goes to the last by two slides, so that it decides anew on its way."""
 
 
 def daemon(law: str) -> DaemonFile:
@@ -44,7 +46,7 @@ def daemon(law: str) -> DaemonFile:
 
 @cache
 def inputs(law: str) -> tuple[tuple[Sample, Requests], ...]:
-    """Two seconds of S3, then steps of the reference: all that the core is given of it."""
+    """A second of S3, then a step of the reference a second: all that the core is given of it."""
     slave = SlaveFile.model_validate(
         {"clock": {"mode": "lockstep", "period_s": PERIOD_S}, "sensor": {"noise_std_m": 1e-5}}
     )
@@ -56,8 +58,8 @@ def inputs(law: str) -> tuple[tuple[Sample, Requests], ...]:
         given.append((snapshot.sample, requests))
         if snapshot.sample.time_s < 1.0:
             return requests
-        writes = int(2.0 * snapshot.sample.time_s)
-        return replace(requests, eta=QUIET, reference_m=(0.3 + 0.2 * (writes % 3)) * STROKE_M, reference_writes=writes)
+        writes = int(snapshot.sample.time_s)
+        return replace(requests, eta=QUIET, reference_m=ASKED[writes % 3] * STROKE_M, reference_writes=writes)
 
     for _ in play_script(cycle, dcs, 3.0):
         pass

@@ -10,7 +10,7 @@ from positioner.estimation.refiner import InProcessRefiner, RefinementJob
 from tests.cases import few_always
 
 SINE, *STAIRCASES = EXPERIMENTS
-JUMPS = [SensorFault(at_s, inf, by * STROKE_M) for by in (-0.1, 0.02, 0.1) for at_s in (0.25, 0.5, 0.8)]
+JUMPS = [SensorFault(at_s, inf, by * STROKE_M) for by in (0.02, 0.1, -0.1) for at_s in (0.25, 0.5, 0.8)]
 SHORT = [SensorFault(0.5, 1e-3, 0.1 * STROKE_M), SensorFault(0.4, 0.2, nan), SensorFault(0.7, 0.2, -0.02 * STROKE_M)]
 
 
@@ -21,12 +21,12 @@ def wrong(fault: SensorFault, seed: int = 0) -> bool:
     return decision.applied.ratios is not None and min(off(SINE, decision, each) for each in (0.0, by_m)) > 1.0
 
 
-@pytest.mark.parametrize("fault", few_always([*SHORT, *JUMPS[::2]], 2), ids=str)
+@pytest.mark.parametrize("fault", few_always([*SHORT, *JUMPS], 2), ids=str)
 def test_a_sine_with_a_sensor_that_jumps_applies_nothing_wrong(fault: SensorFault) -> None:
     assert not wrong(fault)
 
 
-@pytest.mark.parametrize("fault", few_always(JUMPS), ids=str)
+@pytest.mark.parametrize("fault", few_always([JUMPS[0], JUMPS[4], *JUMPS], 2), ids=str)
 def test_nor_where_nobody_refines(fault: SensorFault, monkeypatch: pytest.MonkeyPatch) -> None:
     """The algebraic estimates have a residual of their own."""
 

@@ -100,10 +100,8 @@ SIGNED += [("spike", by) for by in (-0.1, 0.01, 0.1)]
 MATRIX = [Spoiled(kind, by, at_s) for (kind, by), at_s in product([*SIGNED, ("freeze", 0.05), ("freeze", 0.2)], AT_S)]
 HARD = [
     Spoiled("jump", -0.1, 0.115),
-    Spoiled("jump", -0.03, 0.13),
     Spoiled("jump", 0.03, 0.105),
     Spoiled("drift", -0.05, 0.105),
-    Spoiled("drift", 0.01, 0.2),
 ]
 SMALL = [Spoiled("drift", by, at_s) for by, at_s in product((-0.004, 0.004, 0.002), (0.0, 0.105, 0.3, 0.6))]
 
