@@ -86,7 +86,7 @@ class Device:
         self._supply_pa = math.inf
         self.position_m = self.pressure_pa = 0.0
         self.drops = False
-        self._boot()
+        self.boot()
         self._measure()
 
     @property
@@ -179,7 +179,7 @@ class Device:
         """Give parameters of the valve new values at once."""
         self._valve.change(**parameters)
 
-    def _boot(self) -> None:
+    def boot(self) -> None:
         """Begin with the settings of the file."""
         self._started = self._last_heard = self._samples
         self.status = HEALTHY
@@ -225,7 +225,7 @@ class Device:
         self._measured_s = now_s
         self.drops, self._supply_pa = found.drops, found.supply_pa
         if found.restarts:
-            self._boot()
+            self.boot()
         # The transmitter goes on in any case, so that a fault does not change the noise after it.
         indicated_m = self._valve.indicated_m
         position_m = self._transmitter.measure(

@@ -237,7 +237,7 @@ def test_a_device_restarted_meanwhile_keeps_its_own_command() -> None:
     loop = loop_of().away()
     loop.driver.lost = 1
     loop.cycle.once()
-    loop.device._boot()
+    loop.device.boot()
     loop.run(1.0)
     assert loop.decision.fault is Fault.RESTARTED
     assert loop.decision.command_pa == loop.device.command_pa == 30e3

@@ -63,10 +63,10 @@ class HistoryKeeper:
     """
 
     def __init__(self, table: HistoryTable | None, folder: Path, tell: Callable[[Told], None] | None = None) -> None:
-        self._file = None
+        self.file = None
         if table is not None:
             where = folder / table.folder
-            self._file = HistoryFile(where, table.keep_days, table.limit_mb, beside_another=tell is not None)
+            self.file = HistoryFile(where, table.keep_days, table.limit_mb, beside_another=tell is not None)
         self._tell = tell
         self._valves: list[ValveHistory] = []
         self._waiting: deque[Told | Found] = deque()
@@ -74,7 +74,7 @@ class HistoryKeeper:
         self._overflowed = 0
         self._pending: list[Entry] = []
         self._lost = self._told_lost = 0
-        self._writes = AuditedWrites(0 if self._file is None else self._file.last_write())
+        self._writes = AuditedWrites(0 if self.file is None else self.file.last_write())
         self._written = 0
         self._failed_since_s: float | None = None
         self._failure = ""
@@ -89,7 +89,7 @@ class HistoryKeeper:
         history = ValveHistory(file.valve.name, classes, self)
         history.lost = lambda: self.lost
         self._valves.append(history)
-        now_s, before = time.time(), None if self._file is None else self._file.newest_event(history.valve)
+        now_s, before = time.time(), None if self.file is None else self.file.newest_event(history.valve)
         started = f"version {version('positioner')}"
         if before is not None:
             history.newest = before
@@ -98,12 +98,12 @@ class HistoryKeeper:
         self._enter(history, now_s, Happened(EventKind.STARTED, text=started))
         if before is not None and before.time_s > now_s + CLOCK_SET_S:
             self._enter(history, now_s, _clock_set(now_s - before.time_s))
-        if self._file is not None:
-            if self._file.set_aside is not None:
-                fields = {"file": str(self._file.path), "reason": self._file.set_aside}
+        if self.file is not None:
+            if self.file.set_aside is not None:
+                fields = {"file": str(self.file.path), "reason": self.file.set_aside}
                 log_event(log, logging.ERROR, "history unreadable, begun anew", **fields)
-                self._enter(history, now_s, Happened(EventKind.HISTORY_ANEW, text=self._file.set_aside))
-            rows = changes(history.valve, self._file.settings(history.valve), settings_of(file), now_s)
+                self._enter(history, now_s, Happened(EventKind.HISTORY_ANEW, text=self.file.set_aside))
+            rows = changes(history.valve, self.file.settings(history.valve), settings_of(file), now_s)
             self._pending += rows
             if said := in_words(rows):
                 self._enter(history, now_s, Happened(EventKind.CONFIGURATION, text=said))
@@ -127,7 +127,7 @@ class HistoryKeeper:
 
     def session(self, peer: str, what: str, text: str) -> None:
         """Take what became of a client's connection. Called by the server's threads."""
-        if self._file is not None:
+        if self.file is not None:
             self.offer(Told(time.monotonic(), "", what, peer, text))
 
     def start(self) -> None:
@@ -144,11 +144,11 @@ class HistoryKeeper:
         self._pending += self._writes.close()
         self._health_due_s = self._retry_s = 0.0
         self.turn()
-        if self._file is not None:
+        if self.file is not None:
             if self._pending:
                 fields = {"entries": len(self._pending), "reason": self._failure}
                 log_event(log, logging.ERROR, "the end of the history is lost", **fields)
-            self._file.close()
+            self.file.close()
 
     def turn(self) -> None:
         """Take what waits, and write it. In the thread; tests call it without one."""
@@ -156,14 +156,14 @@ class HistoryKeeper:
         self._look_at_the_clock(now_s)
         self._take()
         self._tell_of_the_lost(now_s)
-        if self._file is None:
+        if self.file is None:
             self._pending.clear()
             return
         if now_s >= self._health_due_s:
             self._health_due_s = now_s + HEALTH_EVERY_S
             self._pending += self._health()
         if now_s >= self._retry_s:
-            self._write(self._file, now_s)
+            self._write(self.file, now_s)
         if (surplus := len(self._pending) - MOST_PENDING) > 0:
             del self._pending[MOST_PENDING:]
             self._lost += surplus

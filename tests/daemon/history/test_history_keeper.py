@@ -137,7 +137,7 @@ def test_numbers_go_on_over_a_restart_and_a_kill_is_told(tmp_path: Path) -> None
     Site(tmp_path).keeper.stop("Terminated")
     killed = Site(tmp_path)
     killed.keeper.turn()
-    killed.keeper._file.close()  # type: ignore[union-attr]  # as the system does for a process that is killed
+    killed.keeper.file.close()  # type: ignore[union-attr]  # as the system does for a process that is killed
     site = Site(tmp_path)
     site.keeper.turn()
     said = [(each.number, each.name, each.text.partition(";")[2]) for each in site.events()]
