@@ -10,7 +10,7 @@ from typing import Self
 
 from pymodbus.constants import ExcCodes
 
-from config.codes import ExperimentState, Fault, InhibitReason, Refusal, State
+from config.codes import ExperimentState, Fault, InhibitReason, Mode, Refusal, State
 from config.errors import CommandFailed, InputError
 from config.modbus_map import MOST_REGISTERS, runs_within
 from config.registers import Register, register_named
@@ -284,6 +284,21 @@ class Dcs:
     @staticmethod
     def _decoded(register: Register, words: list[int], start: int) -> float:
         return register.format.decode(words[register.address - start : register.end - start])
+
+
+def value_of(name: str, word: str) -> float:
+    """Return the number that a person writes for a register; a mode may be given by its name.
+
+    Raises:
+        InputError: it is none.
+    """
+    if name == "mode" and word.upper() in Mode.__members__:
+        return Mode[word.upper()]
+    try:
+        return float(word)
+    except ValueError:
+        words = "".join(f", {mode.name.lower()}" for mode in Mode) if name == "mode" else ""
+        raise InputError(name, f"allowed is a number{words}, got {word!r}") from None
 
 
 def _plain(code: Fault | InhibitReason) -> str:

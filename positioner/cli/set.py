@@ -2,8 +2,6 @@
 
 import argparse
 
-from config.codes import Mode
-from config.errors import InputError
 from positioner.cli.parts.daemon_address import add_connection, connect_dcs
 
 HELP = "write a register of a running daemon"
@@ -19,18 +17,9 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
 
 def run(arguments: argparse.Namespace) -> int:
     """Write it."""
-    value = _number(arguments.name, arguments.value)
+    from positioner.dcs import value_of
+
+    value = value_of(arguments.name, arguments.value)
     with connect_dcs(arguments) as dcs:
         dcs.set(arguments.name, value)
     return 0
-
-
-def _number(name: str, text: str) -> float:
-
-    if name == "mode" and text.upper() in Mode.__members__:
-        return Mode[text.upper()]
-    try:
-        return float(text)
-    except ValueError:
-        words = "".join(f", {mode.name.lower()}" for mode in Mode) if name == "mode" else ""
-        raise InputError(name, f"allowed is a number{words}, got {text!r}") from None

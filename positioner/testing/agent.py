@@ -12,12 +12,11 @@ from collections.abc import Callable, Mapping
 from dataclasses import asdict
 from typing import Any
 
-from config.codes import Mode
 from config.device import ModbusTcpDevice
 from config.errors import CommandFailed, InputError
 from drivers import driver_for
 from drivers.boundary import DriverError
-from positioner.dcs import Dcs
+from positioner.dcs import Dcs, value_of
 
 HOST = "127.0.0.1"
 AGENT_WITHIN_S = 20.0
@@ -49,22 +48,13 @@ def daemon_calls(port: int) -> Calls:
 
     def write(values: dict[str, float | str]) -> None:
         with Dcs(HOST, port, timeout_s=AGENT_WITHIN_S) as dcs:
-            dcs.set_all({name: _number(name, value) for name, value in values.items()})
+            dcs.set_all({name: value_of(name, str(value)) for name, value in values.items()})
 
     def identify(excitation: dict[str, float], within_s: float) -> str | None:
         with Dcs(HOST, port, timeout_s=AGENT_WITHIN_S) as dcs:
             return dcs.identify(excitation, within_s)
 
     return {"get": get, "set": write, "identify": identify}
-
-
-def _number(name: str, value: float | str) -> float:
-    """Return the number of a value; a mode may be given by its name."""
-    if isinstance(value, str):
-        if name != "mode" or value.upper() not in Mode.__members__:
-            raise InputError(name, f"{value!r} is not a number")
-        return float(Mode[value.upper()])
-    return value
 
 
 def device_calls(port: int) -> Calls:

@@ -28,6 +28,7 @@ from sim.composition import Composition
 from sim.effect import Effect, find_effects, first_effects, shipped_effect
 from workbench.blind.input_signal import excitation
 from workbench.blind.trial import LEVELS, NOISE_M, Answer, Trial, refitted_rmse_m
+from workbench.compare.measures import rms
 
 VISIBLE_FLOORS = 0.5  # a valve without the effect misses as much as half the floor
 LEAST_TRAVEL = 0.1
@@ -119,7 +120,7 @@ def _record_trial(
     sensor = Sensor(noise_std_m=NOISE_M, quantum_m=quantum_m, seed=int(generator.integers(2**32)))
     answer = trial.with_disturbances(Composition.from_file(truth), generator) if dirty else clean
     recording = trial.recording(answer.indicated_m, sensor, answer.pressure_pa if pressure else None)
-    return recording, float(np.sqrt(np.mean((recording.position_m - clean.indicated_m) ** 2)))
+    return recording, rms(recording.position_m - clean.indicated_m)
 
 
 def _visible(

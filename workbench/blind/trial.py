@@ -24,6 +24,7 @@ from sim.karnopp import TOLERANCE, Vector, read
 from sim.open_loop import INDICATED, PATH_ROWS, PRESSURE, STEP_S, at_rest, follow
 from sim.transmitter import Transmitter
 from workbench.blind.input_signal import lead_in
+from workbench.compare.measures import rms
 
 NOISE_M = 5e-5
 LEAD_IN_S = 5.0
@@ -144,10 +145,7 @@ def refitted_rmse_m(trials: Sequence[Trial], answers: Sequence[Column], without:
         )
         z = np.clip(found.x, lower + 1e-6, upper - 1e-6)
     theta = _theta(known, z)
-    return [
-        float(np.sqrt(np.mean((trial.answer_m(known, theta) - answer) ** 2)))
-        for trial, answer in zip(trials, answers, strict=True)
-    ]
+    return [rms(trial.answer_m(known, theta) - answer) for trial, answer in zip(trials, answers, strict=True)]
 
 
 def _theta(composition: Composition, z: Vector) -> Vector:

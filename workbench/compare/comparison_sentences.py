@@ -14,7 +14,7 @@ from numpy.typing import NDArray
 from config.drive import Scale
 from config.recording import Column
 from signals.moves import Slip
-from workbench.compare.measures import BLOCK_S
+from workbench.compare.measures import BLOCK_S, rms
 from workbench.compare.phases import PHASES
 from workbench.compare.slip_matching import MatchedSlip, SlipEvents
 from workbench.data.noise_floor import UNKNOWN
@@ -258,7 +258,7 @@ def _share(found: Findings) -> Iterator[Sentence]:
         inside = found.phase == worst
         part = found.residual_m[inside]
         where = "near the stops" if PHASES[worst] == "near stops" else f"in phase {PHASES[worst]!r}"
-        text = f"{100 * share:.0f} % of the squared error is {where}, {found.mm(float(np.sqrt(np.mean(part**2))))} rms"
+        text = f"{100 * share:.0f} % of the squared error is {where}, {found.mm(rms(part))} rms"
         run = np.cumsum(np.diff(inside, prepend=inside[0]))
         grade = np.bincount(run, np.where(inside, found.residual_m**2, 0.0)).astype(np.float64)
         yield Sentence(text, _runs(found, run, grade))

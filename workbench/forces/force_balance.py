@@ -39,6 +39,7 @@ from config.results.result import Brief
 from config.valve_file import ValveParameters
 from sim.effect import Effect, shipped_effect, tried_effects
 from sim.interpreted import own_law
+from workbench.compare.measures import rms
 from workbench.data.imposed_motion import Rows
 
 FIFTHS = 5
@@ -268,7 +269,7 @@ class Balance:
         for k, other in others.items():
             predicted_n[self.fold == k] = (y - X @ other)[self.fold == k]
         predicted = np.isfinite(predicted_n)
-        train_n = _rms(residual_n[np.isin(self.fold, trained)])
+        train_n = rms(residual_n[np.isin(self.fold, trained)])
         values = dict(zip([each.name for each in columns], theta.tolist(), strict=True))
         whole = self._parameters(model, values)
         violations = (
@@ -284,7 +285,7 @@ class Balance:
             whole,
             {} if deviations is None else self._own(model, values, dict(zip(values, deviations.tolist(), strict=True))),
             train_n,
-            _rms(predicted_n[predicted]),
+            rms(predicted_n[predicted]),
             _stroke_logs(self.rows.stroke[predicted], predicted_n[predicted]),
             np.where(predicted, predicted_n, residual_n),
             n * 2.0 * float(np.log(max(train_n, 1e-12))) + free * float(np.log(n)),
@@ -383,10 +384,6 @@ def _yielding(rows: Rows, yield_m: float) -> Column:
             here = -1.0
         z.append(here)
     return np.array(z, dtype=np.float64)
-
-
-def _rms(error_n: Column) -> float:
-    return float(np.sqrt(np.mean(error_n**2)))
 
 
 def _reduce(X: Matrix, y: Column) -> Matrix:

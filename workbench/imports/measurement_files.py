@@ -24,6 +24,7 @@ from config.plain_file import require_moderate
 from workbench.imports import pandas_store
 from workbench.imports.matlab_reader import matlab_columns
 from workbench.imports.mdf4_reader import mdf4_groups
+from workbench.imports.pandas_store import text_of
 from workbench.imports.raw_table import RawTable
 from workbench.imports.typed_tables import (
     NUMBERS,
@@ -114,7 +115,10 @@ def _channels(name: str, dataset: Any) -> Iterator[tuple[str, Any]]:
     if dataset.dtype.kind not in NUMBERS or (kind is not None and bytes(kind) in (b"char", b"cell")):
         return
     values = _unpack(dataset)
-    unit = next((_text(dataset.attrs[key]) for key in ("units", "unit", "Units", "Unit") if key in dataset.attrs), "")
+    unit = next(
+        (text_of(dataset.attrs[key]) for key in ("units", "unit", "Units", "Unit") if key in dataset.attrs),
+        "",
+    )
     yield from (
         (with_unit(each, unit), vector) for each, vector in vectors_of(name, values if kind is None else values.T)
     )
@@ -222,7 +226,3 @@ def _require_tables(path: Path, tables: list[RawTable]) -> list[RawTable]:
     if not tables:
         raise no_vectors(path)
     return tables
-
-
-def _text(value: object) -> str:
-    return value.decode("utf-8", "replace") if isinstance(value, bytes) else str(value)

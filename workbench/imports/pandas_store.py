@@ -45,9 +45,9 @@ def _of_blocks(path: Path, group: Any) -> Iterator[tuple[str, Any]]:
         if values.dtype.kind in NUMBERS:
             stored = np.asarray(values[...])
             by_column = stored.T if stored.shape[-1] == len(names) else stored
-            stamps = str(_text(values.attrs.get("value_type", ""))).startswith(STAMPS)
+            stamps = str(text_of(values.attrs.get("value_type", ""))).startswith(STAMPS)
             for name, column in zip(names, by_column, strict=True):
-                yield _text(name), _stamps(column, values.attrs) if stamps else column.astype(np.float64)
+                yield text_of(name), _stamps(column, values.attrs) if stamps else column.astype(np.float64)
 
 
 def _of_table(path: Path, table: Any) -> Iterator[tuple[str, Any]]:
@@ -66,12 +66,12 @@ def _of_table(path: Path, table: Any) -> Iterator[tuple[str, Any]]:
 
 
 def _index(values: Any, attributes: Any, key: str = "kind") -> Any:
-    kind = _text(attributes.get(key, ""))
+    kind = text_of(attributes.get(key, ""))
     return _stamps(values, attributes, kind) if kind.startswith(STAMPS) else np.asarray(values, dtype=np.float64)
 
 
 def _stamps(values: Any, attributes: Any, kind: str = "") -> list[str]:
-    said = kind or _text(attributes.get("value_type", ""))
+    said = kind or text_of(attributes.get("value_type", ""))
     unit = next((each for each in ("us", "ms", "ns") if f"[{each}]" in said), "ns")
     return [str(each) for each in np.asarray(values, dtype=np.int64).astype(f"datetime64[{unit}]")]
 
@@ -86,5 +86,6 @@ def _strings(pickled: Any) -> list[str]:
     return [each for each in found if each]
 
 
-def _text(value: object) -> str:
+def text_of(value: object) -> str:
+    """Return a name or an attribute of an HDF5 file as text."""
     return value.decode("utf-8", "replace") if isinstance(value, bytes) else str(value)
