@@ -1,6 +1,6 @@
 """What the error code of an emergency (EMCY) means, by CiA 301, 7.2.7."""
 
-COMMAND_OUT_OF_RANGE = 0x6320
+COMMAND_OUT_OF_RANGE = 0x6320  # of a set point that the node does not take
 EMERGENCIES = {
     0x1000: "generic error",
     0x2000: "current",
@@ -30,7 +30,7 @@ EMERGENCIES = {
 """Error codes; a class ends in 00 or 000."""
 OF_THE_DEVICE = (0x2000, 0x3000, 0x5000, 0x6000, 0x7000)
 """Classes by their first digit."""
-OF_A_PARAMETER = 0x6300
+OF_A_PARAMETER = 0x6300  # a class of the software whose device measures and obeys all the same
 
 
 def cause_of(code: int) -> str:
