@@ -141,7 +141,7 @@ STATUS = (
     Register("command", 112, "float32", "Pa", "pressure command"),
     Register("delta_r", 114, "float32", "p.u.", "last change of the reference, kept until the next"),
     Register("sample_age", 116, "float32", "s", "time since the last good measurement"),
-    Register("reference_in_force", 118, "float32", "p.u.", "what the law follows; outside automatic, the stem"),
+    Register("reference_in_force", 118, "float32", "p.u.", "what the law follows; while it follows none, the stem"),
     Register("position_deg", 134, "float32", "deg", "the same of a valve that turns; NaN: it has a stem"),
     _coded("restored", 122, Restored, "what was known before the daemon was started"),
     Register("emergency", 124, "uint16", "1", "CANopen: error code of the device's last EMCY, 0 when it is over"),

@@ -639,7 +639,7 @@ def _consumed(now: Now, supervision: SupervisionMemory) -> ConsumedRequests:
 def _reference(now: Now, mode: Mode, consumed: ConsumedRequests, *, waits: bool) -> tuple[Reference, OnCourse]:
     """Return the reference in force, and its course.
 
-    Outside automatic it follows the stem: delta r counts from where the stem is.
+    Outside automatic, and until one is asked for, it follows the stem: delta r counts from where the stem is.
 
     So it does where what is asked for is in force already and the stem is elsewhere: S3 may have taken it there.
     """
@@ -647,7 +647,7 @@ def _reference(now: Now, mode: Mode, consumed: ConsumedRequests, *, waits: bool)
     written = requests.reference_writes != consumed.reference_writes
     start = memory.reference
     stands_m = start.value_m if now.stem_m is None else now.stem_m
-    if mode is not AUTOMATIC or memory.supervision.mode is not mode:
+    if mode is not AUTOMATIC or memory.supervision.mode is not mode or not written:
         start = Reference(stands_m)
     if mode is not AUTOMATIC or not written or waits:
         return start, memory.course if settings is None else OnCourse.begun(start.value_m, now.sample.now_s)
