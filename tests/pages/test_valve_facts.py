@@ -85,6 +85,13 @@ def test_an_old_measurement_is_no_figure_while_what_is_commanded_is() -> None:
     assert "the last good measurement is 3.0 s old" in [each.text for each in valve_facts.status(old)]
 
 
+@pytest.mark.parametrize(("code", "lines"), [(0, []), (math.nan, []), (0x2310, ["0x2310: current"])])
+def test_an_emergency_has_a_line_where_there_is_one(code: float, lines: list[str]) -> None:
+    """A Modbus device had a line of CANopen."""
+    told = valve_facts.status(with_values(emergency=code))
+    assert [each.text for each in told if "CANopen" in each.label] == lines
+
+
 def test_ne107_has_a_letter_its_words_and_the_deciding_cause_first() -> None:
     causes = (Ne107Cause.NOT_AUTOMATIC, Ne107Cause.FRICTION_HIGH)
     bits = sum(1 << (cause - 1) for cause in causes)
