@@ -1,6 +1,6 @@
 """The calibration of the loops' evidence: `python -m benchmarks.loops [--drawn N] [--data FOLDER]`.
 
-It prints what `workbench.loops.calibration`, `LIMITS.sticks_probability` and `LIMITS.least_interval` hold: three
+It prints what `workbench.loops.calibration`, `LIMITS.sticks_probability` and `LIMITS.size_within` hold: three
 numbers from N drawn loops of the seeds from 1000 on, and of N others of the seeds from 2000 on how many are wrong. Of
 FOLDER, loops of others with labels (`positioner bench --labelled`), none calibrates anything: it prints how well they
 are told. How often a verdict is right on further loops says `positioner bench`. Last comes how long a day at one sample
@@ -23,6 +23,7 @@ from workbench.bench.methods import evidence_of, loop_records
 from workbench.bench.scores import area
 from workbench.loops import LoopRecord, diagnose_loop
 from workbench.loops.calibration import Calibration, Evidence
+from workbench.loops.causes import Size
 from workbench.loops.thresholds import LIMITS
 
 NUMBERS, THRESHOLD = 1000, 2000
@@ -34,12 +35,13 @@ DAY = 86_400
 
 @dataclass(frozen=True, slots=True)
 class Told:
-    """A loop's evidence, whether it sticks, whether a record of it could be judged, and S found of S, or None."""
+    """A loop's evidence, whether it sticks, whether a record of it could be judged, S as found, and S, %."""
 
     evidence: Evidence
     sticks: bool
     judged: bool
-    size_ratio: float | None
+    size: Size | None
+    stiction_pct: float | None
 
 
 def calibrate(loops: Sequence[Evidence], sticks: Array) -> Calibration:
@@ -59,9 +61,8 @@ def tell(case: Case) -> Told | None:
     said = [diagnose_loop(each) for each in loop_records(case)]
     if not said:
         return None
-    friction = said[0].causes.friction if said[0].causes else None
-    ratio = friction.stiction_pct / case.stiction_pct if friction and case.stiction_pct else None
-    return Told(evidence_of(said), case.truth == "1", any(each.causes for each in said), ratio)
+    size = said[0].causes.friction.size if said[0].causes else None
+    return Told(evidence_of(said), case.truth == "1", any(each.causes for each in said), size, case.stiction_pct)
 
 
 def told_of(pool: ProcessPoolExecutor, drawn: int, first_seed: int, labelled: Path | None) -> list[Told]:
@@ -98,11 +99,19 @@ def calibration(numbers: Sequence[Told], others: Sequence[Told], labelled: Seque
     of_a_plant = 100 * most_wrong(scores >= least, sticks)
     yield f"from {least:g} on: {counted(scores >= least, ~sticks)}; in a plant {of_a_plant:.1f} % at most"
     yield f"below {LIMITS.other_probability:g}: {counted(scores < LIMITS.other_probability, sticks)}"
-    off = [abs(np.log(e.size_ratio)) for e, p in zip(others, scores, strict=True) if p >= least and e.size_ratio]
-    yield f"95 % of those called lie within {np.quantile(off, 0.95):.3f} in logarithm" if off else "none called"
+    found = [(e.size, e.stiction_pct) for e, p in zip(others, scores, strict=True) if p >= least and e.stiction_pct]
+    yield from sizes([(size, s_pct) for size, s_pct in found if size])
     if labelled:
         scores, sticks = scored(labelled, fitted)
         yield f"{len(labelled)} labelled: AUC {area(scores, sticks):.3f}, {counted(scores >= least, ~sticks)}"
+
+
+def sizes(found: Sequence[tuple[Size, float]]) -> Iterator[str]:
+    """Yield how near S is to that of drawn loops."""
+    off = [abs(size.stiction_pct / s_pct - 1.0) for size, s_pct in found if size.told]
+    held = sum(size.low_pct <= s_pct <= size.high_pct for size, s_pct in found)
+    yield f"S is in its interval in {held} of {len(found)}, told of {len(off)}"
+    yield f"95 % of these lie within {np.quantile(off, 0.95):.3f} of it" if off else "none is told"
 
 
 def of_a_day() -> str:

@@ -88,11 +88,11 @@ def test_what_was_worked_out_of_a_plants_loop_is_kept_and_taken_as_kept(
     assert main(words) == 1
     (kept,) = (tmp_path / "out/examinations").glob("*/*.json")
     found = json.loads(kept.read_text())
-    found["friction"]["high_pct"] = 77.0
+    found["friction"]["size"]["high_pct"] = 77.0
     kept.write_text(json.dumps(found))
     capsys.readouterr()
     assert main(words) == 1
-    assert "to 77)" in capsys.readouterr().err
+    assert "to 77 %" in capsys.readouterr().err
     written(tmp_path / "a.csv", "t,a,b", loop().time_s, loop().op_pct, loop().pv + 1.0)
     assert main(words) == 1
-    assert "to 77)" not in capsys.readouterr().err
+    assert "to 77 %" not in capsys.readouterr().err

@@ -71,7 +71,7 @@ def evidence_of(said: list[LoopDiagnosis]) -> Evidence:
 def _of_loop(case: Case, said: list[LoopDiagnosis]) -> Answer:
     joint = together(said)
     called = (joint.probability or 0.0) >= LIMITS.sticks_probability
-    size = joint.stiction_pct[0] if joint.stiction_pct else None
+    size = joint.size.stiction_pct if joint.size and joint.size.told else None
     score = CALIBRATION.probability(evidence_of(said))
     return Answer(case.set, case.name, OURS, score, "sticks" if called else "", size)
 

@@ -27,7 +27,7 @@ from workbench.loops.oscillation import Oscillation
 from workbench.loops.stem_and_process import cost_of, costs_of_stems, respond, rest_positions
 from workbench.loops.thresholds import LIMITS
 
-CAUSES_FORM = 2
+CAUSES_FORM = 3
 """To be raised when causes would come out differently: what was kept is then made anew."""
 SHARES = (0.12, 0.17, 0.24, 0.33, 0.44, 0.55, 0.66, 0.77, 0.87, 0.95)
 """Apparent stiction that is tried, of the output's span: less does not rule a loop, beyond it the stem never moves."""
@@ -67,19 +67,44 @@ class Process:
 
 
 @dataclass(frozen=True, slots=True)
-class Friction:
-    """The stem that explains PV best.
-
-    Attributes:
-        stiction_pct, low_pct, high_pct: apparent stiction S and its 95 % interval, % of the output.
-        slip_jump_pct: J, likewise.
-        slides_on: whether the stem follows after a slip until the output turns.
-        process: what the process makes of it.
-    """
+class Size:
+    """Apparent stiction S and its 95 % interval, % of the output."""
 
     stiction_pct: float
     low_pct: float
     high_pct: float
+
+    @classmethod
+    def of(cls, stiction_pct: float, low_pct: float, high_pct: float) -> "Size":
+        """Return S and what the likelihood leaves open of it, widened by what a model of a stem has wrong."""
+        factor = 1.0 + LIMITS.size_within
+        return cls(stiction_pct, low_pct / factor, high_pct * factor)
+
+    @property
+    def told(self) -> bool:
+        """Whether the likelihood leaves open no more than S to `LIMITS.size_within`."""
+        most = (1.0 + LIMITS.size_within) ** 2
+        return max(self.stiction_pct / self.low_pct, self.high_pct / self.stiction_pct) <= most
+
+    @property
+    def said(self) -> str:
+        """S and its interval, or where S is not told the interval, as people read them."""
+        interval = f"{self.low_pct:.2g} to {self.high_pct:.2g}"
+        return f"{self.stiction_pct:.2g} ({interval})" if self.told else interval
+
+
+@dataclass(frozen=True, slots=True)
+class Friction:
+    """The stem that explains PV best.
+
+    Attributes:
+        size: S.
+        slip_jump_pct: J, % of the output.
+        slides_on: whether the stem follows after a slip until the output turns.
+        process: what the process makes of it.
+    """
+
+    size: Size
     slip_jump_pct: float
     slides_on: bool
     process: Process
@@ -183,7 +208,7 @@ def hold_causes(record: LoopRecord, oscillation: Oscillation, action: int) -> Ca
     """Return the causes of what a loop does; `action` is the sign that the process's gain must have, 0 if unknown."""
     rows = rows_of(record, oscillation)
     held = _hold(rows, action, DELAYS)
-    friction = _refined(rows, held.trials, action)
+    friction = _refined(rows, held, action)
     process = friction.process
     costs = {
         "friction": process.cost,
@@ -276,7 +301,7 @@ def fitted_path(record: LoopRecord, oscillation: Oscillation, friction: Friction
     """Return what friction makes of a record's output."""
     rows = rows_of(record, oscillation)
     pct, every = rows.output_pct, rows.coarse
-    size, jump = friction.stiction_pct / pct, friction.slip_jump_pct / pct
+    size, jump = friction.size.stiction_pct / pct, friction.slip_jump_pct / pct
     stem = rest_positions(rows.output, size, jump, friction.slides_on)
     told = _response(rows, stem, friction.process)
     weights = np.polyfit(told, rows.pv, 1)
@@ -291,17 +316,18 @@ def fitted_path(record: LoopRecord, oscillation: Oscillation, friction: Friction
     )
 
 
-def _refined(rows: Rows, trials: _Trials, action: int) -> Friction:
-    """Return the best stem, sought ever nearer from the best few."""
+def _refined(rows: Rows, held: _Held, action: int) -> Friction:
+    """Return the best stem, sought ever nearer from the best few; its interval in nats that count, as evidence."""
+    trials = held.trials
     starts = np.argsort(trials.least)[:STARTS].tolist()
     tried = [trials, *(near for start in starts for near in _nearer(rows, trials, start, action))]
     best = min(tried, key=lambda each: float(each.least.min()))
     stem = int(np.argmin(best.least))
     size, jump, process = float(best.stiction[stem]), float(best.slip_jump[stem]), best.process(stem)
-    inside = np.concatenate([t.stiction[t.least < process.cost + LIMITS.interval_cost] for t in tried])
-    factor, pct = float(np.exp(LIMITS.least_interval)), rows.output_pct
-    low, high = min(float(inside.min()), size / factor), max(float(inside.max()), size * factor)
-    return Friction(size * pct, low * pct, high * pct, jump * pct, bool(best.slides_on[stem]), process)
+    most = process.cost + LIMITS.interval_cost * max(1.0, held.alone - process.cost) ** 0.5
+    inside, pct = np.concatenate([t.stiction[t.least < most] for t in tried]), rows.output_pct
+    sized = Size.of(size * pct, float(inside.min()) * pct, float(inside.max()) * pct)
+    return Friction(sized, jump * pct, bool(best.slides_on[stem]), process)
 
 
 def _nearer(rows: Rows, best: _Trials, stem: int, action: int) -> Iterator[_Trials]:

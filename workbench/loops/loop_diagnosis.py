@@ -67,9 +67,11 @@ class LoopDiagnosis(Result):
         """The whole in one line."""
         if self.verdict == "sticks":
             assert self.causes is not None
+            friction = self.causes.friction
+            jump = f", slip jump {friction.slip_jump_pct:.2g} %" if friction.size.told else ""
             return (
                 f"{self.record.name}: the valve sticks ({self.sticks_said} %): apparent stiction "
-                f"{self.stiction_said} % of the output, slip jump {self.causes.friction.slip_jump_pct:.2g} %"
+                f"{friction.size.said} % of the output{jump}"
             )
         if self.verdict == "something else":
             return f"{self.record.name}: not the valve's friction: {self.cause}"
@@ -88,10 +90,7 @@ class LoopDiagnosis(Result):
     @property
     def stiction_said(self) -> str:
         """S and its interval, % of the output, as people read them; of a valve that sticks."""
-        if self.verdict != "sticks" or self.causes is None:
-            return "–"
-        each = self.causes.friction
-        return f"{each.stiction_pct:.2g} ({each.low_pct:.2g} to {each.high_pct:.2g})"
+        return self.causes.friction.size.said if self.verdict == "sticks" and self.causes else "–"
 
     @property
     def advice(self) -> str:
@@ -166,8 +165,8 @@ class LoopDiagnosis(Result):
             "verdict": self.verdict,
             "cause": self.cause,
             "probability_sticks": self.probability,
-            "stiction_pct": friction.stiction_pct if friction else None,
-            "stiction_pct_95": [friction.low_pct, friction.high_pct] if friction else None,
+            "stiction_pct": friction.size.stiction_pct if friction and friction.size.told else None,
+            "stiction_pct_95": [friction.size.low_pct, friction.size.high_pct] if friction else None,
             "slip_jump_pct": friction.slip_jump_pct if friction else None,
             "evidence_nats": {"pv": self.evidence.pv.nats, "op": self.evidence.output.nats},
             "costs_nats": self.causes.costs if self.causes else {},

@@ -77,7 +77,7 @@ def find_remedies(
         noise: of PV, standard deviation.
         period_s: of the samples.
     """
-    size, jump, gain = causes.friction.stiction_pct, causes.friction.slip_jump_pct, causes.gain
+    size, jump, gain = causes.friction.size.stiction_pct, causes.friction.slip_jump_pct, causes.gain
     loop = _Loop(
         law.gain,
         law.gain * period_s / law.reset_s,

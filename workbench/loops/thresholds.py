@@ -55,8 +55,9 @@ class Thresholds:
     """Below which another cause is named: 6 of 103 such held-out drawn loops stick, where half of all do."""
     interval_cost: float = 1.92
     """Nats by which the likelihood may fall inside a 95 % interval: half the chi-square of one parameter."""
-    least_interval: float = 0.29
-    """Half width of an interval of S at least, logarithm: 95 % of the drawn loops called sticking lie within."""
+    size_within: float = 0.2
+    """Of S, to which it is told: what a maintenance plan asks. Where the likelihood leaves more open, S is not told;
+    where it leaves less, the model of the stem is no better: 95 % of the drawn loops it is told of lie within."""
     together_period: float = 0.05
     """Relative difference of periods below which loops oscillate together."""
 

@@ -10,6 +10,7 @@ import pytest
 from workbench.bench import drawn_loops
 from workbench.bench.drawn_loops import DrawnLoop
 from workbench.loops import LoopDiagnosis, LoopRecord, diagnose_loop
+from workbench.loops.causes import Size
 
 draw_loop = cache(drawn_loops.draw_loop)
 
@@ -31,8 +32,20 @@ def test_a_sticking_valve_is_called_so_and_how_much(seed: int) -> None:
     assert found.causes is not None
     assert found.causes.friction is not None
     friction = found.causes.friction
-    assert friction.low_pct < loop.truth.stiction_pct < friction.high_pct
-    assert friction.stiction_pct == pytest.approx(loop.truth.stiction_pct, rel=0.2)
+    assert friction.size.low_pct < loop.truth.stiction_pct < friction.size.high_pct
+    assert friction.size.stiction_pct == pytest.approx(loop.truth.stiction_pct, rel=0.2)
+
+
+def test_where_the_likelihood_leaves_more_than_a_fifth_open_the_interval_alone_is_said() -> None:
+    found = diagnosed(10, "sticks")[1]
+    assert found.causes is not None
+    for high, told in ((5.9, True), (6.1, False)):
+        size = Size.of(5.0, 4.6, high)
+        open_one = replace(found, causes=replace(found.causes, friction=replace(found.causes.friction, size=size)))
+        assert size.told == told
+        assert ("apparent stiction 5 (" in open_one.sentence) == told
+        assert ("slip jump" in open_one.sentence) == told
+        assert (open_one.as_json()["stiction_pct"] == 5.0) == told
 
 
 def test_what_to_do_is_said_with_settings_and_what_they_bring() -> None:
@@ -106,7 +119,7 @@ def test_reversed_action_is_said_and_changes_nothing_else(turned: Callable[[Loop
     assert found.probability == pytest.approx(again.probability, rel=1e-3)
     assert found.causes is not None
     assert again.causes is not None
-    assert again.causes.friction.stiction_pct == pytest.approx(found.causes.friction.stiction_pct, rel=1e-3)
+    assert again.causes.friction.size.stiction_pct == pytest.approx(found.causes.friction.size.stiction_pct, rel=1e-3)
     assert np.sign(again.causes.gain) == -np.sign(found.causes.gain)
 
 
