@@ -107,8 +107,7 @@ class Plan:
         wherever it leaves no more than a share of the error. The spring of the stuck stem is 1/c.
         """
         now, thresholds, s = self.now, self.now.bounds.thresholds, self.now.side
-        longest_m = thresholds.longest_giving * now.bounds.stroke_m
-        if self.memory.move.preslid >= thresholds.most_preslid or abs(now.error_m) > longest_m:
+        if self.memory.move.preslid >= thresholds.most_preslid or abs(now.error_m) > now.bounds.longest_giving_m:
             return None
         gives = compliance(now.balance.held, s)
         if gives is None or gives.spread > thresholds.preslid_within:

@@ -111,6 +111,11 @@ class SlideBounds:
     """The least difference of two commands that the device is told."""
     thresholds: SlideThresholds = THRESHOLDS
 
+    @property
+    def longest_giving_m(self) -> float:
+        """How far a packing gives way at the most, m: a stem that has gone farther has slid."""
+        return self.thresholds.longest_giving * self.stroke_m
+
     def allowed_pa(self, pressure_pa: float) -> float:
         """Return the allowed pressure, Pa, that is nearest to one; NaN of one that is not finite."""
         return clamped(pressure_pa, self.minimum_pa, self.maximum_pa)

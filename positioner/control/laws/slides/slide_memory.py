@@ -125,5 +125,5 @@ class SlideMemory:
 
     def anchor_at(self, rest_m: float, bounds: SlideBounds) -> Anchor | None:
         """Return where the last slide ended, of a stem that rests at a place, m: far off, something else moved it."""
-        anchor, near_m = self.anchor, bounds.thresholds.longest_giving * bounds.stroke_m
-        return None if anchor is None or abs(rest_m - anchor.position_m) > near_m else anchor
+        anchor = self.anchor
+        return None if anchor is None or abs(rest_m - anchor.position_m) > bounds.longest_giving_m else anchor

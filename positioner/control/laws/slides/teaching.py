@@ -6,8 +6,7 @@
     it was sent elsewhere meanwhile   has arrived if it has gone its way by then; if not, nothing was seen
 
 What these say of the interval: `breakaway_distance.py`. A slide onto a stop says nothing, nor one that something else
-than a command has moved. One that goes not half as far, but farther than a packing gives way, says that friction has
-grown: then those that held before it say nothing either, for they were sent by a balance that is no more.
+than a command has moved.
 """
 
 from dataclasses import replace
@@ -30,7 +29,7 @@ def after_outcome(memory: SlideMemory, outcome: SlideOutcome, now: Now) -> Slide
 
 
 def _after_slide(memory: SlideMemory, outcome: SlideOutcome, now: Now) -> SlideMemory:
-    thresholds, stroke_m = now.bounds.thresholds, now.bounds.stroke_m
+    thresholds = now.bounds.thresholds
     s, to_m, slide = outcome.direction, outcome.position_m, slide_of(memory.state)
     if outcome.moved and memory.row is not None and memory.row.stuck:
         memory = replace(memory, move=Move(thresholds.most_slides))
@@ -38,17 +37,12 @@ def _after_slide(memory: SlideMemory, outcome: SlideOutcome, now: Now) -> SlideM
         return replace(memory, anchor=Anchor(to_m, s) if outcome.landing else None, row=None)
     if slide is None:
         return memory
-    way_m, went_m, missed_m = slide.way_m, slide.went_m(to_m), abs(slide.to_m - to_m)
-    near_m = max(thresholds.missed * way_m, now.quantum_m)
-    half_way = went_m > thresholds.gave_way * way_m
-    moved = missed_m <= near_m or abs(to_m - outcome.from_m) > thresholds.longest_giving * stroke_m or half_way
-    if not moved:
+    if not slid_away(slide, to_m, now.bounds):
         return held(memory, slide, now)
+    way_m, went_m, missed_m = slide.way_m, slide.went_m(to_m), abs(slide.to_m - to_m)
     landed = replace(memory, anchor=Anchor(to_m, s), row=None)
-    if not half_way:  # friction has grown
-        return replace(landed, distances=memory.learnt)
     scatter_m = max(thresholds.missed_deviations * now.balance.scatter_m, outcome.std_m)
-    near_m = max(near_m, now.bounds.dead_band_m)
+    near_m = max(thresholds.missed * way_m, now.quantum_m, now.bounds.dead_band_m)
     elsewhere = _went_elsewhere(slide, went_m, near_m, now)
     if not elsewhere and missed_m > max(near_m, scatter_m):
         return landed
@@ -90,9 +84,7 @@ def sent_elsewhere(memory: SlideMemory, slide: Slide, now: Now) -> SlideMemory:
 
 def slid_away(slide: Slide, position_m: float, bounds: SlideBounds) -> bool:
     """Whether the stem has gone farther in its slide than a packing gives way."""
-    thresholds = bounds.thresholds
-    gives_m = min(thresholds.longest_giving * bounds.stroke_m, thresholds.gave_way * slide.way_m)
-    return slide.went_m(position_m) > gives_m
+    return slide.went_m(position_m) > min(bounds.longest_giving_m, bounds.thresholds.gave_way * slide.way_m)
 
 
 def held(memory: SlideMemory, slide: Slide, now: Now) -> SlideMemory:

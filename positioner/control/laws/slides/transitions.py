@@ -122,9 +122,8 @@ def _seen_for_a_while(state: Out, now: Now) -> bool:
 
 def settled(memory: SlideMemory, now: Now, rest: Rest) -> SlideMemory:
     """Return the memory of a stem that has come to rest: what it is to do from here."""
-    bounds, row = now.bounds, memory.row
-    moved_m = bounds.thresholds.longest_giving * bounds.stroke_m
-    if row is not None and row.stuck_at_m is not None and abs(rest.position_m - row.stuck_at_m) > moved_m:
+    bounds, stuck_m = now.bounds, None if memory.row is None else memory.row.stuck_at_m
+    if stuck_m is not None and abs(rest.position_m - stuck_m) > bounds.longest_giving_m:
         memory = replace(memory, row=None, move=Move(bounds.thresholds.most_slides))
     move = memory.move.refilled(now.now_s, bounds)
     anchor = memory.anchor_at(rest.position_m, bounds)
