@@ -114,7 +114,7 @@ def excited(
             (BEFORE, AFTER, 1e-3, 1e-4),
             (AFTER, BEFORE, 5e-3, 1e-5),
         ],
-        4,
+        3,
     ),
 )
 def test_it_is_found_out_and_what_is_applied_is_as_sure_as_it_says(
