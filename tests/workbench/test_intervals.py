@@ -14,12 +14,13 @@ from tests.workbench.valves import SLIM, record_of
 from workbench.blind.hiding import hide
 from workbench.data.record import ready
 from workbench.fit.ends import search_about
-from workbench.fit.fit_result import terms
+from workbench.fit.fit_result import Counted, mean_square, terms
 from workbench.fit.fitting import fit
-from workbench.fit.likelihood import Groups, Likelihood, soft
+from workbench.fit.likelihood import WEIGHTS, Groups, Likelihood, soft
 from workbench.fit.minimiser import Effort, End, derivatives, descend
 from workbench.fit.problem import problem
 from workbench.fit.uncertainty import RISE_95, uncertainty
+from workbench.select.effect_acceptance import LEAST_BIC
 
 DRAWS = 100
 TELL = 6
@@ -91,12 +92,32 @@ def test_a_combination_names_who_takes_part_in_it_and_by_which_power() -> None:
 def test_each_landing_break_away_and_parameter_that_moved_is_one_witness(like: Likelihood) -> None:
     """Samples in motion hang together and count for fewer; a rest is one, however long."""
     groups = like.at(like.composition.theta, like.run.first_onsets_s())
-    found = terms(like, groups, moved=np.array([0.3, -2.0, 1.0]))
+    counted = Counted(groups, like.layout.rest_of, len(like.moves))
+    found = terms(like, counted, np.array([0.3, -2.0, 1.0]))
     assert found.landings.independent == groups.landings.size
     assert found.break_aways.independent == groups.break_aways.size
     assert found.moved.independent == 3
     assert found.rests.independent == np.unique(like.layout.rest_of).size
-    assert 0.0 < found.motion.independent <= groups.motion.size
+    assert len(like.moves) <= found.motion.independent <= groups.motion.size
+
+
+def test_the_scale_of_residuals_goes_with_them_however_large_they_are() -> None:
+    """The noise leaves 1; a wild sample hardly changes it."""
+    r = np.random.default_rng(3).standard_normal(2000)
+    assert mean_square(r, WEIGHTS.soft) == pytest.approx(np.mean(r**2), rel=0.05)
+    assert mean_square(1e4 * r, WEIGHTS.soft) == pytest.approx(1e8 * mean_square(r, WEIGHTS.soft), rel=1e-2)
+    r[7] = 1e5
+    assert mean_square(30.0 * r, WEIGHTS.soft) < 1.5 * 900.0
+
+
+def test_a_break_away_that_is_wrong_is_one_event(like: Likelihood) -> None:
+    """A stem that creeps by more than the noise is seen to break loose under no load: that alone refutes no model."""
+    groups = like.at(like.composition.theta, like.run.first_onsets_s())
+    one_wrong = np.zeros(20)
+    one_wrong[3] = 767.0
+    wrong = Counted(groups._replace(break_aways=one_wrong), like.layout.rest_of, len(like.moves))
+    half = Counted(groups._replace(break_aways=np.full(20, 4.0)), like.layout.rest_of, len(like.moves))
+    assert 0.0 < terms(like, wrong).break_aways.evidence < LEAST_BIC < terms(like, half).break_aways.evidence
 
 
 def test_what_only_a_sum_of_two_coordinates_tells_is_open_in_their_difference(like: Likelihood) -> None:

@@ -36,6 +36,8 @@ AT_BOUND = 1e-3
 """Of a coordinate's range, within which it is at the end of it."""
 TRIED_STATIC = 13
 """Values of static friction in its interval: the free run is the same between the break-aways that each brings."""
+SCALE_ROUNDS, SAME_SCALE = 60, 1e-6
+"""Of squares of a scale, each a factor nearer; and the factor less 1 that is none."""
 WANTS_OUT = 2.0
 """Deviations from the end of a range to where the cost would be least: the record wants the parameter beyond it."""
 
@@ -45,6 +47,11 @@ class Term(NamedTuple):
 
     independent: float
     mean_square: float
+
+    @property
+    def evidence(self) -> float:
+        """That more than the noise is left."""
+        return self.independent * log(self.mean_square)
 
 
 NO_TERM = Term(0.0, 1.0)
@@ -208,7 +215,7 @@ def fit_at(problem: Problem, like: Likelihood, end: End, agreement: int) -> Fit:
         floor_m=record.floor_m,
         cost=end.cost,
         count=like.count,
-        terms=terms(like, end.groups),
+        terms=terms_of_all(like, end.groups),
         moves=len(problem.told),
         agreement=agreement,
         condition=determined.condition,
@@ -249,37 +256,56 @@ def _as_runs_freely(like: Likelihood, end: End, determined: Uncertainty) -> End:
     return replace(end, z=best, groups=groups, cost=like.cost(groups.whole))
 
 
-def terms(like: Likelihood, groups: Groups, rest_of: Rows | None = None, moved: Vector | None = None) -> Terms:
-    """Return what the residuals say, kind by kind; and how far the parameters had moved for them, in deviations.
+class Counted(NamedTuple):
+    """Residuals that are counted: of all moves or of some, the rest that each block is of, how many moves."""
 
-    Samples in motion that hang together count for fewer; landings and break-aways are as many as they are. A rest is
-    one witness, however long: one that a model gets wrong is one event.
+    groups: Groups
+    rest_of: Rows
+    moves: int
 
-    Args:
-        like: whose residuals they are.
-        groups: all of them, or those of some moves.
-        rest_of: the rest of each block, where they are some, (blocks,).
-        moved: how far the parameters had to go, in deviations.
+
+def terms(like: Likelihood, counted: Counted, moved: Vector | None = None) -> Terms:
+    """Return what the residuals say, kind by kind; and how far the parameters had to go for them, in deviations.
+
+    Samples in motion that hang together count for fewer, a move for one witness at the least; landings are as many as
+    they are. A rest is one witness, however long, and a break-away, however wrong: what one event gets wrong, a model
+    of all the others need not know.
     """
-    scale = like.weights.soft
+    scale, (motion, landings, rests, break_aways) = like.weights.soft, counted.groups
     return Terms(
-        _term(groups.motion, scale, independent_share(groups.motion)),
-        _term(groups.landings, scale, 1.0),
-        _rests(groups.rests, like.layout.rest_of if rest_of is None else rest_of, scale),
-        _term(groups.break_aways, scale, 1.0),
-        _term(np.empty(0) if moved is None else moved, scale, 1.0),
+        _term(motion, scale, max(independent_share(motion) * motion.size, counted.moves)),
+        _term(landings, scale, landings.size),
+        _term_of_events(rests, counted.rest_of, scale),
+        _term_of_events(break_aways, np.arange(break_aways.size), scale),
+        NO_TERM if moved is None else _term(moved, scale, moved.size),
     )
 
 
-def _term(r: Vector, scale: float, share: float) -> Term:
-    return Term(share * r.size, max(1.0, 2.0 * float(soft(r, scale).mean())) if r.size else 1.0)
+def terms_of_all(like: Likelihood, groups: Groups) -> Terms:
+    """Return what all residuals of a likelihood say."""
+    return terms(like, Counted(groups, like.layout.rest_of, len(like.moves)))
 
 
-def _rests(r: Vector, rest_of: Rows, scale: float) -> Term:
-    """Return the term of rests: the geometric mean of the mean squares of each."""
+def _term(r: Vector, scale: float, independent: float) -> Term:
+    return Term(independent, max(1.0, mean_square(r, scale))) if r.size else NO_TERM
+
+
+def mean_square(r: Vector, scale: float) -> float:
+    """Return s^2 of residuals r, (rows,), such that the soft cost of r / s is that of the noise (Huber's scale)."""
+    square = 1.0
+    for _ in range(SCALE_ROUNDS):
+        factor = 2.0 * float(soft(r / square**0.5, scale).mean())
+        square *= factor
+        if factor <= 1.0 + SAME_SCALE:
+            break
+    return square
+
+
+def _term_of_events(r: Vector, event_of: Rows, scale: float) -> Term:
+    """Return the term of events, one witness each: the geometric mean of the mean squares of each."""
     if not r.size:
         return NO_TERM
-    _, of = np.unique(rest_of, return_inverse=True)
+    _, of = np.unique(event_of, return_inverse=True)
     squares = np.bincount(of, 2.0 * soft(r, scale)) / np.bincount(of)
     return Term(float(squares.size), float(np.exp(np.mean(np.log(np.maximum(squares, 1.0))))))
 

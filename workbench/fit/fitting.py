@@ -19,7 +19,7 @@ from sim.karnopp import Vector
 from workbench.data.record import Record, ready, require_few_samples
 from workbench.data.stretches import informative
 from workbench.fit.ends import NATS, search_about, settle
-from workbench.fit.fit_result import Fit, Terms, fit_at, terms
+from workbench.fit.fit_result import Fit, Terms, fit_at, terms_of_all
 from workbench.fit.likelihood import Likelihood
 from workbench.fit.minimiser import COARSE, GLIMPSE, WHOLE, Effort, End, begin_by_landings, derivatives, descend
 from workbench.fit.onsets import with_onsets
@@ -176,7 +176,7 @@ class Trial:
     @property
     def terms(self) -> Terms:
         """The eased likelihood of the best valley."""
-        return terms(self.like, self.valleys[0].groups)
+        return terms_of_all(self.like, self.valleys[0].groups)
 
 
 @linear_algebra_alone()
@@ -220,7 +220,7 @@ def glimpse(
     if other_order is not None and not at_the_noise(best.cost, like.count):
         onsets_s, _ = with_onsets(like, like.theta(other_order), COARSE_ROUNDS)
         ends.append(descend(like, other_order, onsets_s, GLIMPSE))
-    begun = terms(like, like.at(like.theta(off), base.onsets_s))
+    begun = terms_of_all(like, like.at(like.theta(off), base.onsets_s))
     return Trial(whole, tuple(sorted(ends, key=lambda each: each.cost)), begun)
 
 

@@ -53,7 +53,7 @@ class Weights:
     """Residuals beyond which one counts by its amount alone: a wild sample is no evidence."""
     beside: int = 3
     """Samples before and after a move that count one by one: each speaks against one that is early or late."""
-    wild: float = 1e4
+    wild: float = 1e6
     """Residual of a sample where the model has no answer."""
 
 

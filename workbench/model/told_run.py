@@ -107,13 +107,21 @@ class ToldRun:
         self._fed = {each.segment.first: self._fed_m(each.segment) for each in self._parts}
 
     def _fed_m(self, segment: Segment) -> Vector:
-        """Return what a positioner is fed: the measured stem, m, (periods + 1,); NaN where none obeys it."""
+        """Return what a positioner is fed, m, (periods + 1,): the measured stem at rest; in a move the simulated, NaN.
+
+        Where no positioner obeys it, NaN throughout. A pressure that is told the stem throughout a long move drifts.
+        """
         if not self._composition.by_setpoint:
             return np.full(segment.periods_s.size + 1, np.nan)
         rows = np.arange(segment.first, segment.end)
         known = self.record.valid[rows]
         seen_m = np.interp(rows, rows[known], self.record.position_m[rows][known])
-        return np.interp(np.arange(segment.periods_s.size + 1) / segment.parts, np.arange(rows.size), seen_m)
+        fed_m = np.interp(np.arange(segment.periods_s.size + 1) / segment.parts, np.arange(rows.size), seen_m)
+        for each in self.moves:
+            if segment.first <= each.before < segment.end:
+                begin, over = (segment.parts * (row - segment.first) for row in (each.before, each.after))
+                fed_m[begin:over] = np.nan
+        return fed_m
 
     def first_onsets_s(self) -> Vector:
         """Return the onsets as the samples show them: amid the period after the last sample at rest."""

@@ -24,9 +24,9 @@ from config.results.result import Brief
 from sim.composition import STATIC, Composition
 from sim.karnopp import Vector
 from workbench.data.held_out import HELD_OUT_RECORDING, Part, Split, residual_m
-from workbench.fit.fit_result import Fit, Terms, terms
+from workbench.fit.fit_result import Counted, Fit, Terms, terms
 from workbench.fit.fitting import COARSE_ROUNDS, at_the_noise, problem_of
-from workbench.fit.likelihood import Groups, Likelihood, Rows
+from workbench.fit.likelihood import Groups, Likelihood
 from workbench.fit.minimiser import descend
 from workbench.fit.onsets import with_onsets
 from workbench.fit.uncertainty import FARTHEST
@@ -136,7 +136,7 @@ def block_errors(fit: Fit, split: Split) -> BlockErrors:
         structure=max(
             structure(part.record, told.error_m, negligible_m) for part, told in ((train, fitted), (test, held_out))
         ),
-        held_out=terms(held_out.like, *_of_counted(held_out.like, held_out.groups, test), held_out.moved),
+        held_out=terms(held_out.like, _of_counted(held_out.like, held_out.groups, test), held_out.moved),
     )
 
 
@@ -218,11 +218,11 @@ def _counted(like: Likelihood, part: Part) -> list[bool]:
     return [bool(part.counted[each.after]) for each in like.moves]
 
 
-def _of_counted(like: Likelihood, groups: Groups, part: Part) -> tuple[Groups, Rows]:
-    """Return the residuals of the moves that count, and of the rests they end in; and the rest of each block."""
+def _of_counted(like: Likelihood, groups: Groups, part: Part) -> Counted:
+    """Return the residuals of the moves that count, and of the rests they end in."""
     counted = _counted(like, part)
     if all(counted):
-        return groups, like.layout.rest_of
+        return Counted(groups, like.layout.rest_of, len(counted))
     moves = [k for k, counts in enumerate(counted) if counts]
     rests = [like.layout.rest_after[k] for k in moves if like.layout.rest_after[k] >= 0]
     rows, blocks = like.layout.in_motion, np.isin(like.layout.rest_of, rests)
@@ -232,7 +232,7 @@ def _of_counted(like: Likelihood, groups: Groups, part: Part) -> tuple[Groups, R
         groups.rests[blocks],
         groups.break_aways[np.isin(like.broken, moves)],
     )
-    return found, like.layout.rest_of[blocks]
+    return Counted(found, like.layout.rest_of[blocks], len(moves))
 
 
 def event_logs(fit: Fit, part: Part) -> Column:
