@@ -56,16 +56,15 @@ def diagnosed() -> Diagnosis:
 
 
 @pytest.mark.long
-def test_friction_differs_between_the_directions_but_break_aways_less(diagnosed: Diagnosis) -> None:
-    """The error falls to a twentieth; that it is not added is what the five break-aways say, 4 % of F_c off."""
+def test_friction_differs_between_the_directions(diagnosed: Diagnosis) -> None:
+    """The error falls to a twentieth. A creep of 2.5 mrad under no load is one event against it, and no more."""
     (found,) = [each.model for each in diagnosed.steps[0].candidates if each.name == "asymmetric_friction"]
     assert found is not None
     assert diagnosed.base.errors.test_rmse_m > 10.0
     assert 0.3 < found.errors.test_rmse_m < 1.9
     # Viscous friction trades with it: searches that end equally low differ by 0.02.
     assert found.fit.parameters["asymmetric_friction.asymmetry"].value == pytest.approx(-0.12, abs=0.02)
-    assert found.breaks_elsewhere
-    assert "asymmetric_friction" not in diagnosed.missing
+    assert "asymmetric_friction" in diagnosed.missing
 
 
 @pytest.mark.long

@@ -36,8 +36,6 @@ AT_BOUND = 1e-3
 """Of a coordinate's range, within which it is at the end of it."""
 TRIED_STATIC = 13
 """Values of static friction in its interval: the free run is the same between the break-aways that each brings."""
-SCALE_ROUNDS, SAME_SCALE = 60, 1e-6
-"""Of squares of a scale, each a factor nearer; and the factor less 1 that is none."""
 WANTS_OUT = 2.0
 """Deviations from the end of a range to where the cost would be least: the record wants the parameter beyond it."""
 
@@ -287,18 +285,7 @@ def terms_of_all(like: Likelihood, groups: Groups) -> Terms:
 
 
 def _term(r: Vector, scale: float, independent: float) -> Term:
-    return Term(independent, max(1.0, mean_square(r, scale))) if r.size else NO_TERM
-
-
-def mean_square(r: Vector, scale: float) -> float:
-    """Return s^2 of residuals r, (rows,), such that the soft cost of r / s is that of the noise (Huber's scale)."""
-    square = 1.0
-    for _ in range(SCALE_ROUNDS):
-        factor = 2.0 * float(soft(r / square**0.5, scale).mean())
-        square *= factor
-        if factor <= 1.0 + SAME_SCALE:
-            break
-    return square
+    return Term(independent, max(1.0, 2.0 * float(soft(r, scale).mean()))) if r.size else NO_TERM
 
 
 def _term_of_events(r: Vector, event_of: Rows, scale: float) -> Term:

@@ -113,18 +113,15 @@ def problem(
     require_units(record, valve)
     told = told_moves(record)
     by = by or sampling(record, valve)
-    if not (_moves_throughout(record, told) and record.by_setpoint and not from_pressure):  # a loop shows it all along
+    in_a_loop = record.by_setpoint and not from_pressure
+    if not (in_a_loop and all(each.never_rests for each in told) and told):  # a loop shows what holds it all along
         _require_motion(record, told, NO_LANDING if by.slow else NO_REST)
     load_n = max(WEIGHTS.break_away * valve.spring_n_per_m * record.scale_m, WEIGHTS.load * valve.coulomb_n)
     return Problem(record, told, by, from_pressure, load_n)
 
 
-def _moves_throughout(record: Record, told: Sequence[ToldMove]) -> bool:
-    return len(told) < LEAST_MOVES and 2 * sum(each.after - each.before for each in told) > len(record)
-
-
 def _require_motion(record: Record, told: Sequence[ToldMove], no_rest: str) -> None:
-    if _moves_throughout(record, told):
+    if len(told) < LEAST_MOVES and 2 * sum(each.after - each.before for each in told) > len(record):
         raise InputError("recording", no_rest)
     if len(told) < LEAST_MOVES:
         raise InputError(

@@ -41,6 +41,8 @@ class ToldMove:
     rested_from: int
     """First row of the rest before it."""
     begins_in_motion: bool
+    never_rests: bool
+    """Whether it is all that its segment shows."""
 
 
 @dataclass(frozen=True, slots=True, repr=False)
@@ -67,9 +69,9 @@ def told_moves(record: Record) -> tuple[ToldMove, ...]:
             until = starts[k + 1] if k + 1 < len(here) else end - first - 1
             rested = here[k - 1].after if k else 0
             after = min(each.after, end - first - 1)
-            found.append(
-                ToldMove(number, first + starts[k], first + after, first + until, first + rested, each.before < 0)
-            )
+            rows = (first + starts[k], first + after, first + until, first + rested)
+            never_rests = each.before < 0 and each.after >= end - first
+            found.append(ToldMove(number, *rows, each.before < 0, never_rests))
     return tuple(found)
 
 
@@ -107,21 +109,17 @@ class ToldRun:
         self._fed = {each.segment.first: self._fed_m(each.segment) for each in self._parts}
 
     def _fed_m(self, segment: Segment) -> Vector:
-        """Return what a positioner is fed, m, (periods + 1,): the measured stem at rest; in a move the simulated, NaN.
+        """Return what a positioner is fed: the measured stem, m, (periods + 1,); NaN, the simulated, without a rest.
 
-        Where no positioner obeys it, NaN throughout. A pressure that is told the stem throughout a long move drifts.
+        Where the stem rests, so does its pressure; where it never does, a pressure that is told the stem drifts.
         """
-        if not self._composition.by_setpoint:
-            return np.full(segment.periods_s.size + 1, np.nan)
         rows = np.arange(segment.first, segment.end)
+        rests = not any(each.never_rests and segment.first <= each.before < segment.end for each in self.moves)
+        if not (self._composition.by_setpoint and rests):
+            return np.full(segment.periods_s.size + 1, np.nan)
         known = self.record.valid[rows]
         seen_m = np.interp(rows, rows[known], self.record.position_m[rows][known])
-        fed_m = np.interp(np.arange(segment.periods_s.size + 1) / segment.parts, np.arange(rows.size), seen_m)
-        for each in self.moves:
-            if segment.first <= each.before < segment.end:
-                begin, over = (segment.parts * (row - segment.first) for row in (each.before, each.after))
-                fed_m[begin:over] = np.nan
-        return fed_m
+        return np.interp(np.arange(segment.periods_s.size + 1) / segment.parts, np.arange(rows.size), seen_m)
 
     def first_onsets_s(self) -> Vector:
         """Return the onsets as the samples show them: amid the period after the last sample at rest."""
