@@ -88,8 +88,11 @@ class Engine:
     def leave_off(self, _: object, trial: ByHand) -> Fit:
         return replace(trial.fit, cost=COARSE * trial.fit.cost, rms_m=COARSE * trial.fit.rms_m)
 
-    def preview(self, _: Fit, __: object, library: Mapping[str, Effect], ___: int) -> tuple[TangentScore, ...]:
-        return tuple(TangentScore(name, 1.0) for name in library)
+    def changes(self, _: object, library: Mapping[str, Effect], __: int) -> Mapping[str, object]:
+        return dict(library)
+
+    def ranked(self, _: object, by: Mapping[str, object]) -> tuple[TangentScore, ...]:
+        return tuple(TangentScore(name, 1.0) for name in by)
 
     def evaluated(self, found: Fit, _: Split) -> EvaluatedModel:
         return EvaluatedModel(found, errors_of(found.rms_m), FLOOR_M)
@@ -103,8 +106,9 @@ def searched(monkeypatch: pytest.MonkeyPatch) -> Searched:
         ends: Ends, *library: str, workers: int = 2, broken_off_after: float = np.inf
     ) -> tuple[EffectStep, ...]:
         engine = Engine(ends, broken_off_after)
-        for name in ("base_fit", "glimpse", "advance", "finish", "leave_off", "evaluated", "preview"):
+        for name in ("base_fit", "glimpse", "advance", "finish", "leave_off", "evaluated", "changes", "ranked"):
             monkeypatch.setattr(effect_search, name, getattr(engine, name))
+        monkeypatch.setattr(effect_search, "Left", lambda *_: None)
         search = search_of({name: LIBRARY[name] for name in library}, monkeypatch, workers)
         base = search.base(valve_with())
         try:

@@ -21,7 +21,7 @@ from workbench.fit.fit_result import Fit
 from workbench.fit.problem import Problem
 from workbench.fit.threads import on_threads
 from workbench.model.parameters import MOST_GRID
-from workbench.select.tangent_preview import Tangents
+from workbench.select.tangent_preview import Left
 
 BEST = 2
 """Points that each of the two gives a fit to begin with."""
@@ -56,10 +56,15 @@ def propose_forms(
         workers: threads, by default one a core.
         tell: called with the fraction done.
     """
-    tangents, names = Tangents(base, of), tuple(effects)
+    left, names = Left(base, of), tuple(effects)
     points = {name: effects[name].strengths(base.valve.valve)[:MOST_GRID] for name in names}
     shares: dict[str, tuple[list[float], list[float]]] = {}
-    found = on_threads(lambda name: tangents.shares(effects[name], points[name]), names, workers)
+
+    def shared(name: str) -> tuple[list[float], list[float]]:
+        found = left.changed_by(effects[name], points[name])
+        return [*map(left.share, found)], [*map(left.share_of_landings, found)]
+
+    found = on_threads(shared, names, workers)
     for name, each in zip(names, found, strict=True):
         shares[name] = each
         tell(len(shares) / len(names))

@@ -44,7 +44,7 @@ from workbench.select.forward_selection import MOST_ADDED, without_missing
 from workbench.select.pressure_errors import pressure_errors
 from workbench.select.pressure_scatter import with_pressure_scatter
 from workbench.select.separating_experiment import Experiment, experiment
-from workbench.select.tangent_preview import preview
+from workbench.select.tangent_preview import Changes, Left, changes, ranked
 
 BEAM = 3
 """Models that a round goes on from: of two effects that are missing, the second's best imitation is mostly second."""
@@ -97,6 +97,7 @@ class EffectSearch:
         self._race = race or (lambda _step, _name, _rms_m: None)
         self._problem = problem(split.train.record, known.valve, from_pressure=from_pressure)
         self._rounds: dict[tuple[str, ...], _Round] = {}
+        self._changes: Changes = {}
 
     @property
     def problem(self) -> Problem:
@@ -129,6 +130,8 @@ class EffectSearch:
         """Search from a fitted valve."""
         beam = [_Round(base, ())]
         for number in range(1, MOST_ADDED + 1):
+            if number == 2:
+                self._changes = self._changes_of(beam[0])
             for each in beam:
                 self._try_all(number, each)
             found = [model for each in beam for model, _ in self._extended(each)]
@@ -156,21 +159,35 @@ class EffectSearch:
                 return experiment(apart, self._split.train.record, workers=self._workers)
         return None
 
+    def _beside(self, here: _Round) -> dict[str, Effect]:
+        """Return the effects that a model does not have, by any name."""
+        there = {name for each in here.added for name in algebraic_class(each, self._library)}
+        return {name: each for name, each in self._library.items() if name not in there}
+
+    def _changes_of(self, here: _Round) -> Changes:
+        """Return what each effect that is tried at once changes of a model."""
+        first = {name: each for name, each in self._beside(here).items() if each.after not in self._library}
+        return changes(Left(here.before.fit, self._problem), first, self._workers)
+
+    def _screened(self, here: _Round, names: Sequence[str]) -> list[str]:
+        """Return the effects whose tangents promise most beside a model, first of them what the best one has."""
+        shown = {name: self._changes[name] for name in names if name in self._changes}
+        best_one_has = [name for name in names if name not in shown]
+        by_tangents = [each.name for each in ranked(Left(here.before.fit, self._problem), shown)]
+        return [*best_one_has, *by_tangents][:SCREENED]
+
     def _try_all(self, number: int, here: _Round) -> None:
         """Fit every effect beside a model."""
-        there = {name for each in here.added for name in algebraic_class(each, self._library)}
         here.models.clear()
         self._rounds[here.added] = here
-        first = [name for name, each in self._library.items() if each.after not in self._library and name not in there]
-        if number > 1:
-            shown = {name: self._library[name] for name in first}
-            first = [each.name for each in preview(here.before.fit, self._problem, shown, self._workers)[:SCREENED]]
-        self._fit_beside(number, here, first)
+        beside = self._beside(here)
+        first = [name for name, each in beside.items() if each.after not in self._library]
+        self._fit_beside(number, here, first if number == 1 else self._screened(here, first))
         evident = {name for name, each in here.models.items() if self._evidence(here.before, each) > LEAST_BIC}
         after = [
             name
-            for name, each in self._library.items()
-            if each.after in self._library and name not in there and (each.after in evident or each.after in here.added)
+            for name, each in beside.items()
+            if each.after in self._library and (each.after in evident or each.after in here.added)
         ]
         if after and not any(self._leaves_nothing(each) for each in here.models.values() if not isinstance(each, str)):
             self._fit_beside(number, here, after)

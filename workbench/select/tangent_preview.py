@@ -1,11 +1,12 @@
-"""The tangent preview: a first ranking of the effects in a second, before any of them is fitted. Not a verdict.
+"""The tangent preview: a ranking of the effects in a second, before any of them is fitted. Not a verdict.
 
-    r residual of the bare fit, J its derivatives by the fitted parameters and onsets, t the change that an effect makes
+    r residual of a fit, J its derivatives by the fitted parameters and onsets, t the change that an effect makes
     score = (r' P t)^2 / (r' P r  t' P t),    P projects J out;  0 where t goes with r, away from the record
 
 Limits and quanta do nothing until they are strong enough: hence all strengths that an effect starts with, the best of
 which counts, and not the weakest. The right effect stands first in two thirds of the cases, in the first three in seven
-of eight (`benchmarks.first_ranking`).
+of eight (`benchmarks.first_ranking`). What an effect changes beside one model is nearly what it changes beside another
+that is as near to the record: a search composes them with its best model, and ranks them beside all others by that.
 """
 
 from collections.abc import Mapping, Sequence
@@ -19,7 +20,7 @@ from sim.effect import Effect
 from workbench.fit.breaking_off import go_on
 from workbench.fit.fit_result import Fit
 from workbench.fit.fitting import extended
-from workbench.fit.likelihood import Groups, Likelihood, soft_weight
+from workbench.fit.likelihood import Groups, soft_weight
 from workbench.fit.minimiser import derivatives
 from workbench.fit.problem import Problem
 from workbench.fit.threads import on_threads
@@ -35,52 +36,64 @@ class TangentScore:
     score: float
 
 
+class Left:
+    """What a fit leaves of its record, and how much of it a change explains."""
+
+    def __init__(self, fit: Fit, of: Problem) -> None:
+        self.fit, self.of = fit, replace(of, eased=fit.eased)
+        composition = Composition.from_file(fit.valve)
+        like = self.of.likelihood(composition, tuple(fit.parameters))
+        self.groups = like.at(composition.theta, fit.onsets_s)
+        slopes = derivatives(like, like.coordinates(composition.theta), fit.onsets_s)
+        ends = np.cumsum([each.size for each in self.groups])
+        soft = like.weights.soft
+        self._all = _Projection(self.groups.whole, slopes, soft)
+        self._landings = _Projection(self.groups.landings, slopes[ends[0] : ends[1], : len(fit.parameters)], soft)
+
+    def share(self, change: Groups) -> float:
+        """Return the score of a change."""
+        return self._all.score(change.whole)
+
+    def share_of_landings(self, change: Groups) -> float:
+        """Return the same by landings alone: where slides end hangs on forces, however far off the motion is."""
+        return self._landings.score(change.landings)
+
+    def changed_by(self, effect: Effect, points: Sequence[tuple[float, ...]]) -> list[Groups]:
+        """Return what an effect changes of the residuals at each of these values of its parameters."""
+        composition = extended(self.fit.valve, (effect.written,), self.fit.valve.valve)
+        like = self.of.likelihood(composition, ())
+        found = []
+        for values in points:
+            go_on()
+            theta = composition.theta.copy()
+            theta[theta.size - len(values) :] = values
+            found.append(Groups(*map(np.subtract, like.at(theta, self.fit.onsets_s), self.groups)))
+        return found
+
+
+Changes = Mapping[str, Sequence[Groups]]
+"""Of each effect, at each of its strengths."""
+
+
+def changes(left: Left, library: Mapping[str, Effect], workers: int | None = None) -> Changes:
+    """Return what each effect changes of a fit, on so many threads, by default one a core."""
+    valve = left.fit.valve.valve
+    found = on_threads(lambda each: left.changed_by(each, each.strengths(valve)), tuple(library.values()), workers)
+    return dict(zip(library, found, strict=True))
+
+
+def ranked(left: Left, by: Changes) -> tuple[TangentScore, ...]:
+    """Rank the effects by their changes of this fit, or of one that is as near to the record, best first."""
+    scores = [TangentScore(name, max(map(left.share, each), default=0.0)) for name, each in by.items()]
+    return tuple(sorted(scores, key=lambda each: -each.score))
+
+
 def preview(
     base: Fit, of: Problem, library: Mapping[str, Effect], workers: int | None = None
 ) -> tuple[TangentScore, ...]:
-    """Rank the effects by their tangents on the fitted part, best first, on so many threads, by default one a core."""
-    tangents = Tangents(base, of)
-
-    def scored(name: str) -> TangentScore:
-        effect = library[name]
-        return TangentScore(name, max(tangents.shares(effect, effect.strengths(base.valve.valve))[0]))
-
-    return tuple(sorted(on_threads(scored, tuple(library), workers), key=lambda each: -each.score))
-
-
-class Tangents:
-    """What a bare fit leaves, and how much of it the change that an effect makes explains."""
-
-    def __init__(self, base: Fit, of: Problem) -> None:
-        self._base, self._of = base, replace(of, eased=base.eased)
-        composition = Composition.from_file(base.valve)
-        like = self._of.likelihood(composition, tuple(base.parameters))
-        self._bare = like.at(composition.theta, base.onsets_s)
-        slopes = derivatives(like, like.coordinates(composition.theta), base.onsets_s)
-        ends = np.cumsum([each.size for each in self._bare])
-        soft = like.weights.soft
-        self._all = _Projection(self._bare.whole, slopes, soft)
-        self._landings = _Projection(self._bare.landings, slopes[ends[0] : ends[1], : len(base.parameters)], soft)
-
-    def shares(self, effect: Effect, points: Sequence[tuple[float, ...]]) -> tuple[list[float], list[float]]:
-        """Return the score of an effect at each of these values of its parameters, by all residuals, and by landings.
-
-        Where slides end hangs on forces alone: it tells a place from another where the motion is far off.
-        """
-        composition = extended(self._base.valve, (effect.written,), self._base.valve.valve)
-        like = self._of.likelihood(composition, ())
-        found = [self._with(like, values) for values in points]
-        return (
-            [self._all.score(each.whole - self._bare.whole) for each in found],
-            [self._landings.score(each.landings - self._bare.landings) for each in found],
-        )
-
-    def _with(self, like: Likelihood, values: tuple[float, ...]) -> Groups:
-        """Return the residuals with an effect's parameters, the last of a valve's, at these values."""
-        go_on()
-        theta = like.composition.theta.copy()
-        theta[theta.size - len(values) :] = values
-        return like.at(theta, self._base.onsets_s)
+    """Rank the effects by their tangents on the fitted part, best first."""
+    left = Left(base, of)
+    return ranked(left, changes(left, library, workers))
 
 
 class _Projection:
