@@ -100,7 +100,7 @@ def plant_valve() -> Iterator[str]:
     whole = read_export(DATA / "plant_valve" / "half_hour.csv", read_mapping(words), PLANT.valve.stroke_m)
     half = len(whole) // 2
     found = fit(Recording({name: column[:half] for name, column in whole.columns.items()}), PLANT)
-    off_percent = 100.0 / PLANT.valve.stroke_m * (found.predict(whole) - whole["position_m"])
+    off_percent = 100.0 / PLANT.valve.stroke_m * (found.predict(whole) - whole.columns["position_m"])
     fitted, held_out = (np.sqrt(np.nanmean(off_percent[rows] ** 2)) for rows in (slice(half), slice(half, None)))
     yield f"  {fitted:.3g} % rms fitted, {held_out:.3g} % held out, of a free run"
     yield "  " + ", ".join(f"{name} {each.value:.4g}" for name, each in found.parameters.items())

@@ -91,7 +91,7 @@ class Engine:
     def changes(self, _: object, library: Mapping[str, Effect], __: int) -> Mapping[str, object]:
         return dict(library)
 
-    def ranked(self, _: object, by: Mapping[str, object]) -> tuple[TangentScore, ...]:
+    def rank(self, _: object, by: Mapping[str, object]) -> tuple[TangentScore, ...]:
         return tuple(TangentScore(name, 1.0) for name in by)
 
     def evaluated(self, found: Fit, _: Split) -> EvaluatedModel:
@@ -106,7 +106,7 @@ def searched(monkeypatch: pytest.MonkeyPatch) -> Searched:
         ends: Ends, *library: str, workers: int = 2, broken_off_after: float = np.inf
     ) -> tuple[EffectStep, ...]:
         engine = Engine(ends, broken_off_after)
-        for name in ("base_fit", "glimpse", "advance", "finish", "leave_off", "evaluated", "changes", "ranked"):
+        for name in ("base_fit", "glimpse", "advance", "finish", "leave_off", "evaluated", "changes", "rank"):
             monkeypatch.setattr(effect_search, name, getattr(engine, name))
         monkeypatch.setattr(effect_search, "Left", lambda *_: None)
         search = search_of({name: LIBRARY[name] for name in library}, monkeypatch, workers)

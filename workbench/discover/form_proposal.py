@@ -61,7 +61,7 @@ def propose_forms(
     shares: dict[str, tuple[list[float], list[float]]] = {}
 
     def shared(name: str) -> tuple[list[float], list[float]]:
-        found = left.changed_by(effects[name], points[name])
+        found = left.changes_by(effects[name], points[name])
         return [*map(left.share, found)], [*map(left.share_of_landings, found)]
 
     found = on_threads(shared, names, workers)

@@ -44,7 +44,7 @@ from workbench.select.forward_selection import MOST_ADDED, without_missing
 from workbench.select.pressure_errors import pressure_errors
 from workbench.select.pressure_scatter import with_pressure_scatter
 from workbench.select.separating_experiment import Experiment, experiment
-from workbench.select.tangent_preview import Changes, Left, changes, ranked
+from workbench.select.tangent_preview import Changes, Left, changes, rank
 
 BEAM = 3
 """Models that a round goes on from: of two effects that are missing, the second's best imitation is mostly second."""
@@ -169,11 +169,11 @@ class EffectSearch:
         first = {name: each for name, each in self._beside(here).items() if each.after not in self._library}
         return changes(Left(here.before.fit, self._problem), first, self._workers)
 
-    def _screened(self, here: _Round, names: Sequence[str]) -> list[str]:
+    def _screen(self, here: _Round, names: Sequence[str]) -> list[str]:
         """Return the effects whose tangents promise most beside a model, first of them what the best one has."""
         shown = {name: self._changes[name] for name in names if name in self._changes}
         best_one_has = [name for name in names if name not in shown]
-        by_tangents = [each.name for each in ranked(Left(here.before.fit, self._problem), shown)]
+        by_tangents = [each.name for each in rank(Left(here.before.fit, self._problem), shown)]
         return [*best_one_has, *by_tangents][:SCREENED]
 
     def _try_all(self, number: int, here: _Round) -> None:
@@ -182,7 +182,7 @@ class EffectSearch:
         self._rounds[here.added] = here
         beside = self._beside(here)
         first = [name for name, each in beside.items() if each.after not in self._library]
-        self._fit_beside(number, here, first if number == 1 else self._screened(here, first))
+        self._fit_beside(number, here, first if number == 1 else self._screen(here, first))
         evident = {name for name, each in here.models.items() if self._evidence(here.before, each) > LEAST_BIC}
         after = [
             name

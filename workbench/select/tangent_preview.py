@@ -58,7 +58,7 @@ class Left:
         """Return the same by landings alone: where slides end hangs on forces, however far off the motion is."""
         return self._landings.score(change.landings)
 
-    def changed_by(self, effect: Effect, points: Sequence[tuple[float, ...]]) -> list[Groups]:
+    def changes_by(self, effect: Effect, points: Sequence[tuple[float, ...]]) -> list[Groups]:
         """Return what an effect changes of the residuals at each of these values of its parameters."""
         composition = extended(self.fit.valve, (effect.written,), self.fit.valve.valve)
         like = self.of.likelihood(composition, ())
@@ -78,11 +78,11 @@ Changes = Mapping[str, Sequence[Groups]]
 def changes(left: Left, library: Mapping[str, Effect], workers: int | None = None) -> Changes:
     """Return what each effect changes of a fit, on so many threads, by default one a core."""
     valve = left.fit.valve.valve
-    found = on_threads(lambda each: left.changed_by(each, each.strengths(valve)), tuple(library.values()), workers)
+    found = on_threads(lambda each: left.changes_by(each, each.strengths(valve)), tuple(library.values()), workers)
     return dict(zip(library, found, strict=True))
 
 
-def ranked(left: Left, by: Changes) -> tuple[TangentScore, ...]:
+def rank(left: Left, by: Changes) -> tuple[TangentScore, ...]:
     """Rank the effects by their changes of this fit, or of one that is as near to the record, best first."""
     scores = [TangentScore(name, max(map(left.share, each), default=0.0)) for name, each in by.items()]
     return tuple(sorted(scores, key=lambda each: -each.score))
@@ -93,7 +93,7 @@ def preview(
 ) -> tuple[TangentScore, ...]:
     """Rank the effects by their tangents on the fitted part, best first."""
     left = Left(base, of)
-    return ranked(left, changes(left, library, workers))
+    return rank(left, changes(left, library, workers))
 
 
 class _Projection:
