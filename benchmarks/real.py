@@ -94,14 +94,21 @@ def servo_motor(runs: tuple[str, ...]) -> Iterator[str]:
                 yield f"{'':<10}step {each.step}, {each.name}: {each.rejection_reason}"
 
 
-def plant_valve() -> Iterator[str]:
-    """Yield the figures of the plant valve, % of a stroke taken for 100 mm; spring and area are the shipped valve's."""
+def first_half_of_plant_valve() -> tuple[Recording, Recording]:
+    """Return the recording of the plant valve, and the first 15 minutes of it."""
     words = ["time_s=time_s", "reference_m=setpoint_percent:%", "position_m=position_percent:%"]
     whole = read_export(DATA / "plant_valve" / "half_hour.csv", read_mapping(words), PLANT.valve.stroke_m)
-    half = len(whole) // 2
-    found = fit(Recording({name: column[:half] for name, column in whole.columns.items()}), PLANT)
+    return whole, Recording({name: column[: len(whole) // 2] for name, column in whole.columns.items()})
+
+
+def plant_valve() -> Iterator[str]:
+    """Yield the figures of the plant valve, % of a stroke taken for 100 mm; spring and area are the shipped valve's."""
+    whole, first = first_half_of_plant_valve()
+    found = fit(first, PLANT)
     off_percent = 100.0 / PLANT.valve.stroke_m * (found.predict(whole) - whole.columns["position_m"])
-    fitted, held_out = (np.sqrt(np.nanmean(off_percent[rows] ** 2)) for rows in (slice(half), slice(half, None)))
+    fitted, held_out = (
+        np.sqrt(np.nanmean(off_percent[rows] ** 2)) for rows in (slice(len(first)), slice(len(first), None))
+    )
     yield f"  {fitted:.3g} % rms fitted, {held_out:.3g} % held out, of a free run"
     yield "  " + ", ".join(f"{name} {each.value:.4g}" for name, each in found.parameters.items())
 
