@@ -15,6 +15,7 @@ from workbench.bench.scores import Answer
 from workbench.diagnosis.diagnosis import diagnose
 from workbench.loops import LoopDiagnosis, LoopRecord, diagnose_loop
 from workbench.loops.calibration import CALIBRATION, Evidence, Witness, mean_evidence
+from workbench.loops.causes import of_output_backwards
 from workbench.loops.joint import together
 from workbench.loops.literature_votes import Vote, he
 from workbench.loops.loop_diagnosis import output_alone
@@ -60,7 +61,7 @@ def _of_output(path: Path) -> tuple[Vote, Evidence]:
     record = LoopRecord.of_samples(path.stem, columns["time_s"], output, output)
     oscillation = find_oscillation(record.op_pct, record.period_s)
     vote = he(record.op_pct, oscillation.period_s / record.period_s)
-    return vote, Evidence(Witness(), output_alone(record, oscillation))
+    return vote, Evidence(Witness(), output_alone(record, oscillation, of_output_backwards))
 
 
 def evidence_of(said: list[LoopDiagnosis]) -> Evidence:

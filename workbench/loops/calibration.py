@@ -40,13 +40,14 @@ class Evidence:
     output: Witness
 
 
+def mean_witness(of: Sequence[Witness]) -> Witness:
+    """Return the mean of what witnesses say."""
+    return Witness(*np.mean([(each.nats, each.explained) for each in of], axis=0).tolist())
+
+
 def mean_evidence(records: Sequence[Evidence]) -> Evidence:
     """Return the mean of the evidence of records of one valve: a wrong model of its process errs alike in all."""
-
-    def mean(of: Sequence[Witness]) -> Witness:
-        return Witness(*np.mean([(each.nats, each.explained) for each in of], axis=0).tolist())
-
-    return Evidence(mean([each.pv for each in records]), mean([each.output for each in records]))
+    return Evidence(mean_witness([each.pv for each in records]), mean_witness([each.output for each in records]))
 
 
 @dataclass(frozen=True, slots=True)

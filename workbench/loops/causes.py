@@ -10,6 +10,8 @@ processes, less that of the best other cause: what is tried more often fits bett
 Friction that is small against the output's swing is none of these: where the record shows a valve that follows closely,
 the evidence is therefore negative, and where it shows nothing, 0.
 
+Where no PV is on record, it is what the PI law makes of the output backwards, for each of a few reset times.
+
 The output is asked the same: the loop is closed, so stem, process and controller make of the output what the output is
 later, with the sign of negative feedback. A controller integrates, and so shows a rest of the stem above its noise.
 """
@@ -21,7 +23,7 @@ from typing import Any
 import numpy as np
 import numpy.typing as npt
 
-from workbench.loops.calibration import Evidence, Witness
+from workbench.loops.calibration import Evidence, Witness, mean_witness
 from workbench.loops.loop_record import Array, LoopRecord, averaged
 from workbench.loops.oscillation import Oscillation
 from workbench.loops.stem_and_process import cost_of, costs_of_stems, respond, rest_positions
@@ -40,6 +42,8 @@ WAYS_ROUND = (*DELAYS[1:], 0.35, 0.5)
 """Delays once round the loop, likewise: none would tell the output by itself, and half a cycle turns its sign."""
 NEGATIVE_FEEDBACK = -1
 """Sign with which the loop answers its own output."""
+RESETS = (0.03, 0.1, 0.3, 1.0)
+"""Reset times of the law read backwards, in cycles: with the shortest it integrates, with the longest hardly."""
 LONGER, LATER = (0.7, 1.0, 1.4), (-0.025, 0.0, 0.025)
 """Factors of the lag, and cycles of delay, about the best."""
 FIRST_LAG = 0.02
@@ -229,6 +233,18 @@ def hold_causes(record: LoopRecord, oscillation: Oscillation, action: int) -> Ca
 def of_output(rows: Rows) -> Witness:
     """Return what the output alone says of friction."""
     return _hold(replace(rows, pv=averaged(rows.output, rows.coarse)), NEGATIVE_FEEDBACK, WAYS_ROUND).witness
+
+
+def of_output_backwards(rows: Rows) -> Witness:
+    """Return what the output says of friction by the PV that a PI law would have made it of, up to sign and size.
+
+    Of unknown reset times the mean is taken.
+    """
+    said = []
+    for reset in RESETS:
+        pv = averaged(respond(rows.output, 1, reset * rows.cycle, 0.0, 0) - rows.output, rows.coarse)
+        said.append(_hold(replace(rows, pv=pv), -NEGATIVE_FEEDBACK, DELAYS).witness)
+    return mean_witness(said)
 
 
 @dataclass(frozen=True, slots=True)

@@ -1,6 +1,6 @@
 """The verdict on one loop: it sticks (how much), something else (what), or it cannot be told (why, what would tell)."""
 
-from collections.abc import Mapping
+from collections.abc import Callable, Mapping
 from dataclasses import dataclass
 from typing import TYPE_CHECKING, Any, Literal
 
@@ -10,7 +10,7 @@ from config.extras import import_extra
 from config.results.block import Block, Table
 from config.results.result import Result
 from workbench.loops.calibration import CALIBRATION, Evidence, Witness
-from workbench.loops.causes import Causes, fitted_path, hold_causes, of_output, rows_of
+from workbench.loops.causes import Causes, Rows, fitted_path, hold_causes, of_output, rows_of
 from workbench.loops.controller_law import ControllerLaw, see_law
 from workbench.loops.literature_votes import Vote, votes
 from workbench.loops.loop_record import LoopRecord
@@ -245,11 +245,11 @@ def diagnose_loop(record: LoopRecord, known: Causes | None = None) -> LoopDiagno
     )
 
 
-def output_alone(record: LoopRecord, oscillation: Oscillation) -> Witness:
+def output_alone(record: LoopRecord, oscillation: Oscillation, ask: Callable[[Rows], Witness] = of_output) -> Witness:
     """Return what a record's output says of friction; nothing where it stands, is short, or has few samples a cycle."""
     short = record.op_pct.size < LIMITS.fewest_samples
     slow = oscillation.period_s < LIMITS.fewest_a_cycle * record.period_s
-    return Witness() if short or slow or np.ptp(record.op_pct) == 0.0 else of_output(rows_of(record, oscillation))
+    return Witness() if short or slow or np.ptp(record.op_pct) == 0.0 else ask(rows_of(record, oscillation))
 
 
 def _remedies(record: LoopRecord, oscillation: Oscillation, law: ControllerLaw, causes: Causes) -> tuple[Remedy, ...]:

@@ -10,7 +10,8 @@ import pytest
 from workbench.bench import drawn_loops
 from workbench.bench.drawn_loops import DrawnLoop
 from workbench.loops import LoopDiagnosis, LoopRecord, diagnose_loop
-from workbench.loops.causes import Size
+from workbench.loops.causes import Size, of_output_backwards
+from workbench.loops.loop_diagnosis import output_alone
 
 draw_loop = cache(drawn_loops.draw_loop)
 
@@ -65,6 +66,14 @@ def test_the_output_alone_tells_a_stem_that_rests_from_a_disturbance() -> None:
     told = {cause: diagnosed(seed, cause)[1].evidence for seed, cause in ((10, "sticks"), (7, "external noise"))}
     assert told["sticks"].output.nats > 10.0
     assert told["external noise"].output.nats < 1.0
+
+
+def test_a_law_read_backwards_tells_friction_from_a_swing_that_the_output_alone_leaves_open() -> None:
+    for seed, cause, low, high in ((10, "sticks", 10.0, np.inf), (7, "tight tuning", -np.inf, -3.0)):
+        loop, found = diagnosed(seed, cause)
+        for sign in (1.0, -1.0):
+            record = replace(record_of(loop), op_pct=50.0 + sign * loop.op_pct)
+            assert low < output_alone(record, found.oscillation, of_output_backwards).nats < high
 
 
 def test_what_the_loops_own_output_says_does_not_hang_on_the_process_value() -> None:
