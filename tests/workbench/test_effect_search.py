@@ -156,6 +156,19 @@ def test_two_that_are_missing_are_found_though_another_alone_does_better(
     assert steps[1].before is steps[0].added.model
 
 
+def test_what_imitated_two_is_idle_beside_both_and_left_out(searched: Searched) -> None:
+    """84001: three did better than either of the two that were missing, and one of them stayed in the answer."""
+    imitations = {"presliding": 4.0, "backlash": 4.5, "stribeck": 4.6}
+
+    def ends(there: Effects) -> float:
+        if {"ip_lag", "asymmetric_friction"} <= there:
+            return 1.0
+        alone = min((floors for name, floors in imitations.items() if name in there), default=18.0 if there else 20.0)
+        return alone if len(there) < 2 else 0.8 * alone - 0.3 * ("asymmetric_friction" in there)
+
+    assert added(searched(ends, *imitations, "ip_lag", "asymmetric_friction")) == ["asymmetric_friction", "ip_lag"]
+
+
 def test_what_is_far_behind_is_not_searched_to_its_end(searched: Searched) -> None:
     floors = {"ip_lag": 1.0, "backlash": 1.5, "stribeck": 9.0, "quadratic_drag": 10.0, "friction_drift": 18.0}
     (step,) = searched(lambda there: min((floors[each] for each in there), default=100.0), *floors)

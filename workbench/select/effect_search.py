@@ -4,9 +4,9 @@
 
 A round extends each of the best `BEAM` models, the bare one by every effect, others by the `SCREENED` whose tangents
 promise most, and ranks all that it comes to by their scores. Rounds go on while some extension is evident, and more
-than the noise is left, up to three effects. The best model of all is, of those as likely as the likeliest, that of the
-fewest effects. Its steps are read off the beam: each adds the effect that the beam added there, beside all that were
-tried there.
+than the noise is left, up to three effects. Of an answer of three the later two are tried without the first. The best
+model of all is, of those as likely as the likeliest, that of the fewest effects. Its steps are read off the beam: each
+adds the effect that the beam added there, beside all that were tried there.
 
 An effect that comes after another (`AFTER` in its file) is tried where that one has evidence. A class of effects that
 are one by algebra stands in a model once. Where several effects explain all, what had evidence in an earlier step is
@@ -143,8 +143,23 @@ class EffectSearch:
                 break
             if beam[0].before.explained:
                 beam = beam[:1]
+        if without := self._without_first(base):
+            self._try_all(2, without)
         steps = self._path(base)
         return tuple(self._asked_beside(each, steps[i:]) for i, each in enumerate(steps, start=1))
+
+    def _without_first(self, base: EvaluatedModel) -> _Round | None:
+        """Return the second effect of an answer alone, where the third was not tried beside it: the first may be idle.
+
+        What imitates two effects is ahead of either, and is left in when both are found (floating search; Pudil 1994).
+        """
+        names = self._best_path(base)
+        if len(names) < MOST_ADDED:
+            return None
+        _, second, third = names
+        alone = self._rounds[()].models[second]
+        tried = {frozenset((*added, name)) for added, here in self._rounds.items() for name in here.models}
+        return None if isinstance(alone, str) or {second, third} in tried else _Round(alone, (second,))
 
     def so_far(self, base: EvaluatedModel) -> tuple[EffectStep, ...]:
         """Return the steps made so far, as far as they have come; for a search broken off."""
