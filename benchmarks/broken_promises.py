@@ -99,7 +99,7 @@ BREAKAGES = (
         "positioner/control/controller.py",
         "if sample.unattended_s > 0.0 or not _obeyed(now):",
         "if False:",
-        "tests/control/test_restoration.py::test_what_a_device_did_by_itself_is_no_landing_and_drops_nothing",
+        "tests/control/test_restored_knowledge.py::test_what_a_device_did_by_itself_is_no_landing_and_drops_nothing",
     ),
     Breakage(
         "a sensor that drifts in S3 by a sine applies nothing beyond its deviation",

@@ -28,7 +28,7 @@ import psutil
 from benchmarks.kept_lines import Line, kept
 from config.slave_file import Sensor
 from config.valve_file import ValveFile, load_valve
-from config.writing import write_valve
+from config.valve_file_writer import write_valve
 from sim.composition import Composition
 from workbench.blind.hiding import draw_valve
 from workbench.blind.input_signal import excitation

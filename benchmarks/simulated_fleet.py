@@ -31,7 +31,7 @@ import numpy as np
 from config.recording import Column, Recording
 from config.slave_file import Sensor
 from config.valve_file import ValveFile
-from config.writing import write_valve
+from config.valve_file_writer import write_valve
 from sim.composition import Composition
 from sim.effect import first_effects
 from workbench.blind.hiding import Hidden, hide

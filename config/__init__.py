@@ -8,7 +8,7 @@ Its files:
     travel, travel_table                          opening and stem, by the action of air; table [travel]
     data_sheet, valve_changes                     a valve file from a data sheet; another with values set by hand
     extended_valve                                a valve file worked out for the controller
-    loading, writing, plain_file                  reads such a file; writes a valve's; what may be read at all
+    loading, valve_file_writer, plain_file        reads such a file; writes a valve's; what may be read at all
     file_kinds                                    which of these a file is, where another is asked for
     file_prefix                                   what the names of a valve's files begin with
     json_value                                    a result as JSON has it, which knows no NaN

@@ -26,7 +26,7 @@ if TYPE_CHECKING:
     from config.loading import Fraction, NonNegative, Port, Positive
     from config.recording import Recording
     from config.valve_file import ValveFile, valve
-    from config.writing import write_valve
+    from config.valve_file_writer import write_valve
     from drivers.boundary import (
         BadReply,
         Capabilities,
@@ -61,7 +61,7 @@ _ROOMS = {
     "config.loading": ("Fraction", "NonNegative", "Port", "Positive"),
     "config.recording": ("Recording",),
     "config.valve_file": ("ValveFile", "valve"),
-    "config.writing": ("write_valve",),
+    "config.valve_file_writer": ("write_valve",),
     "drivers.boundary": (
         "BadReply",
         "Capabilities",

@@ -2,7 +2,7 @@
 
     driver, only_watch    drives a node; reads one that another drives
     sdo, pdo              what is asked and set; the cycle's frames
-    configuration         what a node must be told, and what of it it will refuse
+    wanted_settings       what a node must be told, and what of it it will refuse
     found_pdos            PDOs used as the node has them
     watcher, events       heartbeats, boot-up, emergencies; what can happen
     activation            the device states of CiA 408

@@ -311,9 +311,9 @@ def by_steps_pu(valve: "ValveParameters") -> float:
     """Return how far off a first landing in a direction may be left, p.u.
 
     The stem slides by its own jump (F_s - F_c)/k_s and by the step that broke it loose, which is the least near the
-    reference (`first_landing`); what is left then is less than the paper's law can move.
+    reference (`positioner.control.unseen_direction`); what is left then is less than the paper's law can move.
     """
-    from positioner.control.first_landing import LEAST_STEP
+    from positioner.control.unseen_direction import LEAST_STEP
 
     return (valve.static_n - valve.coulomb_n) / (valve.spring_n_per_m * valve.stroke_m) + LEAST_STEP
 

@@ -72,7 +72,7 @@ def _option(key: str) -> str:
 
 def _change_file(arguments: argparse.Namespace) -> int:
     from config.valve_changes import change_valve
-    from config.writing import write_valve
+    from config.valve_file_writer import write_valve
 
     values = dict(map(_read_assignment, arguments.set))
     file = change_valve(read_valve(arguments.of), values, arguments.without)
@@ -99,7 +99,7 @@ def _read_assignment(text: str) -> tuple[str, float]:
 
 def _from_data_sheet(arguments: argparse.Namespace) -> int:
     from config.data_sheet import DataSheet, from_data_sheet
-    from config.writing import write_valve
+    from config.valve_file_writer import write_valve
 
     keys = (*SHEET, "name")
     with naming({key: _option(key) for key in keys}):

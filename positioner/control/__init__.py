@@ -5,17 +5,17 @@ never reads a clock, sleeps, writes a file or touches a socket, so the same code
 real time.
 
     controller, controller_memory               one step, what it remembers and decides
-    records                                     how a record is made: by name
+    keyword_records                             how a record is made: by name
     settings, requests, sample                  what it is given, once and in each cycle
     identifying                                 when the estimators run, and when what they found is applied
     supervision, states, reference              who commands, S0 to S3, the reference and its last change
     lasting_conditions, rest_band               conditions that must not last; where a stem rests by what is known
     laws                                        the laws, a folder each: what commands in S1 and S2
     pressure_clamp                              the one clamp: what is not finite is not commanded
-    pressure_path                               lead against a slow pressure of an extended valve, and its arrival
+    pressure_lead                               lead against a slow pressure of an extended valve, and its arrival
     travel                                      from the DCS's signal to the reference: characteristic, ramp, cut-offs
-    first_landing                               by steps in a direction whose friction is not known
-    valve_knowledge, restoration                what is known of a valve, as data; is it still true after a restart
+    unseen_direction                            by steps in a direction whose friction is not known
+    valve_knowledge, restored_knowledge         what is known of a valve, as data; is it still true after a restart
     excitation                                  S3: which excitation is under way, and when it ends
     sine_excitation, staircase_excitation       a sine, or a staircase of slides
     permissives                                 what permits S3 and an experiment, and what its end does

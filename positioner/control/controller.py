@@ -31,7 +31,7 @@ from config.codes import (
     State,
 )
 from config.quantities import DeviceStatus
-from positioner.control import first_landing, pressure_path
+from positioner.control import pressure_lead, unseen_direction
 from positioner.control.controller_memory import (
     ConsumedRequests,
     ControllerMemory,
@@ -42,23 +42,23 @@ from positioner.control.controller_memory import (
 )
 from positioner.control.excitation import NOTHING, ActiveExcitation, climbed, excitation_after
 from positioner.control.identifying import identify, progress_of
+from positioner.control.keyword_records import by_name
 from positioner.control.lasting_conditions import MonitorMemory, Needs, after_cycle, needs_of
 from positioner.control.laws.boundary import Law, Seen, seen_of
 from positioner.control.played_experiment import PlayedExperiment, Surroundings, experiment_after
 from positioner.control.pressure_clamp import clamped
-from positioner.control.pressure_path import PathMemory, long_held
-from positioner.control.records import by_name
+from positioner.control.pressure_lead import PathMemory, long_held
 from positioner.control.reference import Reference
 from positioner.control.requests import Requests
 from positioner.control.rest_band import RestBand, rest_band
-from positioner.control.restoration import Restoration
+from positioner.control.restored_knowledge import Restoration
 from positioner.control.sample import Sample
 from positioner.control.settings import Settings
 from positioner.control.staircase_excitation import Staircase
 from positioner.control.states import law_inhibit_reason, state_in
 from positioner.control.supervision import NO_FAULT, SupervisionMemory, supervise, usable
-from positioner.control.travel.course import OnCourse
 from positioner.control.travel.cutoffs import HIGH, WITHIN, sent_to_m
+from positioner.control.travel.reference_ramp import OnCourse
 from positioner.control.valve_knowledge import ValveKnowledge, known
 from positioner.estimation.acceptance import Applied, Ratios
 from positioner.estimation.landings.landing_detector import SlideOutcome
@@ -447,7 +447,7 @@ def _law(now: Now, before: Law, seen: Seen, *, one_direction: bool) -> tuple[int
     asked_back = asked_back and seen.reference_m != memory.reference.value_m
     if memory.first_landing != unseen or asked_back:
         law = before.observe(seen)
-        if not first_landing.needed(seen, ratios, law.command_pa, now.settings.limits.stroke_m):
+        if not unseen_direction.needed(seen, ratios, law.command_pa, now.settings.limits.stroke_m):
             return 0, law
     return unseen, before.observe(seen._replace(ratios=None))
 
@@ -463,7 +463,7 @@ def _stepped_pa(now: Now, direction: int, ratios: Ratios, reference: Reference) 
     rest, wanted_pa, stroke_m = now.memory.statics.detector.rest, now.memory.wanted_pa, now.settings.limits.stroke_m
     if rest is None or now.stem_m is None:
         return wanted_pa
-    return first_landing.stepped_pa(wanted_pa, direction, ratios, reference.value_m - rest.position_m, stroke_m)
+    return unseen_direction.stepped_pa(wanted_pa, direction, ratios, reference.value_m - rest.position_m, stroke_m)
 
 
 def _seen(
@@ -567,7 +567,7 @@ def _commanded(now: Now, asked_pa: float, *, lead: bool) -> Commanded | None:
     wanted_pa = command_pa = settings.delivered_pa(limited_pa)
     if path is not None and settings.valve is not None:
         limits_pa = (settings.minimum_pa, settings.maximum_pa)
-        path = pressure_path.after_step(path, now.sample.now_s, wanted_pa, settings.valve.inverse, limits_pa, lead=lead)
+        path = pressure_lead.after_step(path, now.sample.now_s, wanted_pa, settings.valve.inverse, limits_pa, lead=lead)
         if not isfinite(path.command_pa):
             return None
         command_pa = settings.delivered_pa(path.command_pa)

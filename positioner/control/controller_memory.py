@@ -8,17 +8,17 @@ from typing import NamedTuple
 
 from config.codes import Fault, InhibitReason, Mode, State
 from positioner.control.excitation import ActiveExcitation
+from positioner.control.keyword_records import by_name
 from positioner.control.lasting_conditions import MonitorMemory
 from positioner.control.laws.boundary import Law
 from positioner.control.played_experiment import PlayedExperiment
-from positioner.control.pressure_path import PathMemory
-from positioner.control.records import by_name
+from positioner.control.pressure_lead import PathMemory
 from positioner.control.reference import Reference
 from positioner.control.requests import Requests
-from positioner.control.restoration import Restoration
+from positioner.control.restored_knowledge import Restoration
 from positioner.control.supervision import SupervisionMemory
-from positioner.control.travel.course import OnCourse
 from positioner.control.travel.cutoffs import WITHIN
+from positioner.control.travel.reference_ramp import OnCourse
 from positioner.estimation.acceptance import Applied
 from positioner.estimation.estimates import Estimates
 from positioner.estimation.landings.static_identification import StaticIdentification
@@ -89,7 +89,7 @@ class ControllerMemory(NamedTuple):
     excitation: ActiveExcitation | None = None
     identifying: bool = False
     first_landing: int = 0
-    """The direction in which the stem goes by steps to its first landing, 0: it does not; see `first_landing`."""
+    """The direction in which the stem goes by steps to its first landing, 0: it does not; see `unseen_direction`."""
     stands_for: Requests | None = None
     """The requests for which the last decision stands until something else is seen; None: each step decides anew."""
 

@@ -29,7 +29,7 @@ from typing import NamedTuple
 from config.codes import Fault
 from config.daemon_file import DaemonFile
 from config.supervision_table import FaultActionName
-from positioner.control.records import by_name
+from positioner.control.keyword_records import by_name
 from positioner.control.rest_band import RestBand
 
 ENDS = 0.02

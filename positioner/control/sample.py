@@ -3,7 +3,7 @@
 from typing import NamedTuple
 
 from config.codes import Quality
-from positioner.control.records import by_name
+from positioner.control.keyword_records import by_name
 
 
 class Sample(NamedTuple):

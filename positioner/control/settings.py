@@ -14,9 +14,9 @@ from positioner.control.permissives import ExcitationLimits
 from positioner.control.played_experiment import ExperimentLimits
 from positioner.control.staircase_excitation import StaircaseLimits
 from positioner.control.supervision import Limits
-from positioner.control.travel.course import Course
 from positioner.control.travel.cutoffs import Cutoffs
 from positioner.control.travel.dead_band import DeadBand
+from positioner.control.travel.reference_ramp import Course
 from positioner.estimation.acceptance import Applied, Ratios
 from positioner.estimation.landings.extended_balance import straight_law
 from positioner.estimation.online import IdentificationSettings

@@ -19,7 +19,7 @@ from typing import NamedTuple
 from config.codes import GOOD, HOLD, LOST, MANUAL, NO_NUMBER, REPEATED, Fault, Mode
 from config.quantities import DeviceStatus
 from config.supervision_table import FaultActionName, SafeActionName
-from positioner.control.records import by_name
+from positioner.control.keyword_records import by_name
 from positioner.control.requests import Requests
 from positioner.control.sample import Sample
 

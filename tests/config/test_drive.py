@@ -9,7 +9,7 @@ from config.drive import KINDS, VALVE
 from config.errors import InputError
 from config.recording import Recording
 from config.valve_file import EffectTable, ValveFile, ValveParameters, load_valve, shipped_valve
-from config.writing import write_valve
+from config.valve_file_writer import write_valve
 from positioner.cli.main import main
 from sim.composition import Composition
 from sim.effect import shipped_effect, shipped_effects

@@ -11,8 +11,8 @@ import pytest
 from config.errors import InputError
 from config.recording import Recording, write_recording
 from config.valve_file import load_valve, shipped_valve
+from config.valve_file_writer import write_valve
 from config.whole_file import beside, filling
-from config.writing import write_valve
 
 ROOM_BYTES = 64
 

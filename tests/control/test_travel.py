@@ -14,9 +14,9 @@ from config.slave_file import SlaveFile
 from config.travel_table import TravelTable
 from config.valve_file import shipped_valve
 from positioner.control.requests import QUIET, Requests
-from positioner.control.travel.course import Course, OnCourse
 from positioner.control.travel.cutoffs import HIGH, LOW, WITHIN, Cutoffs
 from positioner.control.travel.dead_band import DeadBand
+from positioner.control.travel.reference_ramp import Course, OnCourse
 from positioner.control.travel.signal_path import SignalPath
 from positioner.estimation.acceptance import Ratios
 from positioner.estimation.estimates import Estimate, no_estimate

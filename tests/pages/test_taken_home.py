@@ -18,7 +18,7 @@ import positioner as pos
 from config.data_sheet import DataSheet, from_data_sheet
 from config.recording import Recording, write_recording
 from config.valve_file import ValveFile, load_valve
-from config.writing import valve_toml, write_valve
+from config.valve_file_writer import valve_toml, write_valve
 from positioner.cli.main import main
 from tests.pages.laid_out import hidden
 from workbench.diagnosis import diagnosis as diagnosis_module

@@ -14,7 +14,7 @@ from sim.effect import shipped_effect, shipped_effects
 from sim.simulation import simulate
 from sim.static_inverse import extended_valve
 from workbench.fit.fitting import fit
-from workbench.fleet.valve_course import complaint_of
+from workbench.fleet.valve_complaints import complaint_of
 from workbench.select.equivalence import algebraic_class
 
 ROOT = Path(__file__).parents[2]

@@ -11,7 +11,7 @@ import pytest
 from config.recording import Recording
 from config.slave_file import Sensor
 from config.valve_file import ValveFile, valve
-from config.writing import valve_toml, write_valve
+from config.valve_file_writer import valve_toml, write_valve
 from sim.composition import Composition
 from sim.effect import FINE_STEP_S
 from workbench.blind.input_signal import excitation

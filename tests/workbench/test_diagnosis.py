@@ -14,7 +14,7 @@ import pytest
 
 from config.recording import Recording, read_table, write_recording
 from config.valve_file import load_valve
-from config.writing import valve_toml
+from config.valve_file_writer import valve_toml
 from positioner.cli.main import main
 from tests.workbench.valves import SEED, drawn_valve, record_of, with_effect
 from workbench.diagnosis.diagnosis import Diagnosis, diagnose

@@ -11,7 +11,7 @@ import pytest
 from config.modbus_map import SIMULATED_MAP
 from config.recording import Recording, write_recording
 from config.valve_file import ValveFile, load_valve
-from config.writing import valve_toml
+from config.valve_file_writer import valve_toml
 from positioner.cli.main import main
 from positioner.cli.parts.children import port_in, running
 from sim.composition import Composition

@@ -17,7 +17,7 @@ from workbench.compare.slip_matching import SlipEvents
 from workbench.fit.fitting import fit
 from workbench.report.comparison_report import report_comparison
 from workbench.report.overlay import overlay
-from workbench.report.page import Subject
+from workbench.report.report_html import Subject
 from workbench.report.units import Reading
 
 NOISE_RAD = 5e-4

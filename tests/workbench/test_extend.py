@@ -9,7 +9,7 @@ import pytest
 from config.errors import InputError
 from config.recording import write_recording
 from config.valve_file import load_valve
-from config.writing import valve_toml
+from config.valve_file_writer import valve_toml
 from positioner.cli.main import main
 from sim.valve import Valve
 from tests.workbench.valves import SEED, drawn_valve, record_of, with_effect

@@ -12,7 +12,7 @@ import pytest
 from pyarrow import parquet
 
 from config.valve_file import ValveFile, valve
-from config.writing import write_valve
+from config.valve_file_writer import write_valve
 from positioner.cli.main import main
 from tests.workbench.fleets import HEAD, examined_here, plant, play, record, tables
 from workbench.fleet.examination import Change, Examination
@@ -20,7 +20,7 @@ from workbench.fleet.fleet import fleet
 from workbench.fleet.manifest import Entry, read_manifest
 from workbench.fleet.model_changes import changed_since
 from workbench.fleet.tables import write_tables
-from workbench.fleet.valve_course import ValveCourse
+from workbench.fleet.valve_complaints import ValveCourse
 
 PLACES = {"valve": "V", "file": "V.toml", "recording": "r.csv"}
 ROOT = Path(__file__).parents[2]

@@ -8,7 +8,7 @@ import pytest
 
 from config.errors import InputError
 from config.recording import LONGEST_LINE, Column, Recording, write_recording
-from config.writing import valve_toml
+from config.valve_file_writer import valve_toml
 from positioner.cli.main import main
 from tests.cases import few_always
 from tests.workbench.benches import (

@@ -15,7 +15,7 @@ import pytest
 
 from config.recording import Recording, write_recording
 from config.valve_file import ValveFile
-from config.writing import valve_toml
+from config.valve_file_writer import valve_toml
 from positioner.cli.main import main
 from tests.workbench.generators import case
 

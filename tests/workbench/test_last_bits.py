@@ -11,7 +11,7 @@ from typing import NamedTuple
 
 import pytest
 
-from config.writing import write_valve
+from config.valve_file_writer import write_valve
 from workbench.blind.hiding import hide
 
 NEAR = 0.01

@@ -10,7 +10,7 @@ import pytest
 from config.errors import InputError
 from config.recording import write_recording
 from config.valve_file import load_valve
-from config.writing import valve_toml, write_valve
+from config.valve_file_writer import valve_toml, write_valve
 from positioner.cli.main import main
 from sim.effect import FOLDERS_ALLOWED, find_effect
 from tests.workbench.valves import drawn_valve, record_of, with_effect

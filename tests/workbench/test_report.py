@@ -19,8 +19,8 @@ from workbench.compare.comparison import Comparison, compare
 from workbench.diagnosis.diagnosis import Diagnosis, diagnose
 from workbench.diagnosis.extension_journal import Journal
 from workbench.report import Subject, report_comparison, report_diagnosis, report_journal
-from workbench.report.page import plot
 from workbench.report.plot_series import draw_series, extremes, running_s
+from workbench.report.report_html import plot
 from workbench.select.separating_experiment import Experiment
 
 plotly = pytest.importorskip("plotly")

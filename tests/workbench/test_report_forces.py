@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 from config.recording import write_recording
-from config.writing import valve_toml
+from config.valve_file_writer import valve_toml
 from positioner.cli.main import main
 from tests.workbench.benches import VALVE, benches
 from tests.workbench.pages import Page, read

@@ -19,7 +19,7 @@ from pydantic import BaseModel, ConfigDict, FiniteFloat, ValidationError, model_
 
 from config.errors import CommandFailed, InputError, explain_failure
 from config.recording import write_recording
-from config.writing import valve_toml
+from config.valve_file_writer import valve_toml
 from workbench.blind.hiding import Hidden
 
 SEALED = "sealed.json"

@@ -4,7 +4,7 @@ Its files:
 
     record            cut where it is broken, its bad samples marked, all of it told
     held_out          what is fitted, and what judges
-    clocks            whether the stem moves before its command, or against it
+    clock_difference  whether the stem moves before its command, or against it
     noise_floor       what no model explains: noise, rounding, how well the valve repeats itself
     pressure_lag      the lag of a measured pressure, and what it was where it was not measured
     motion            velocity and acceleration

@@ -17,7 +17,7 @@ import numpy.typing as npt
 from config.errors import InputError
 from config.recording import Column, Recording
 from config.results.result import Brief
-from workbench.data.clocks import Doubt
+from workbench.data.clock_difference import Doubt
 from workbench.data.record import Mask, Record, ready, require_few_samples
 from workbench.data.stretches import informative
 

@@ -23,7 +23,7 @@ from config.results.result import Brief
 from config.valve_file import ValveParameters
 from signals.moves import AT_ONCE, rests_first, slips
 from signals.noise import frozen, held_back_m, quantum_m
-from workbench.data.clocks import Doubt, early, unled
+from workbench.data.clock_difference import Doubt, early, unled
 from workbench.data.noise_floor import UNKNOWN, noise_std_m, not_repeating_m, repeatability_m, said_noise_m
 from workbench.data.pressure_lag import without_gaps_pa
 

@@ -9,8 +9,8 @@ from typing import Self
 from config.drive import Scale
 from config.errors import InputError
 from config.loading import Schema, validate
+from config.valve_file_writer import write_valve
 from config.whole_file import beside
-from config.writing import write_valve
 from workbench.diagnosis.extension import Extension
 
 

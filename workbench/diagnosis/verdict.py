@@ -9,7 +9,7 @@ unexplained   something is missing that the library does not have, or of which w
               Or slides end elsewhere, so that what explains the rest stands in for it; or the valve scatters so much
               that a tenth of the motion is left, which no model could explain
 unjudged      the floor is unknown, so that nobody can say whether anything is left; what lowered the error is named.
-              Or the stem moves before its command, so that no model of it can hold (`workbench.data.clocks`).
+              Or the stem moves before its command, so that no model of it can hold (`workbench.data.clock_difference`).
               Or landings alone are judged, and they are too few, or do not lie where any model has them: what the
               pressure did between samples is not known (`judged_landings`). Or that the command was held there is not
 unfinished    broken off before the search was through; what was known by then is named
@@ -19,7 +19,7 @@ untrusted     the searches disagree, and the best of them explains nothing
 from collections.abc import Sequence
 from typing import Literal
 
-from workbench.data.clocks import Doubt
+from workbench.data.clock_difference import Doubt
 from workbench.diagnosis.judged_landings import JudgedLandings
 from workbench.select.effect_candidates import EffectCandidate, EffectStep, EvaluatedModel
 

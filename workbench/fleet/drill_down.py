@@ -9,13 +9,13 @@ from pathlib import Path
 
 from config.errors import explain_failure
 from config.recording import Recording
-from config.writing import write_valve
+from config.valve_file_writer import write_valve
 from workbench.diagnosis.diagnosis import diagnose
 from workbench.fleet.examination import CHANGED, UNTOLD, request_key
 from workbench.fleet.fleet import Fleet
-from workbench.fleet.valve_course import ValveCourse
+from workbench.fleet.valve_complaints import ValveCourse
 from workbench.report.diagnosis_report import report_diagnosis
-from workbench.report.page import Subject, require_plotly
+from workbench.report.report_html import Subject, require_plotly
 
 KEY_LENGTH = 24
 """Characters of a key that name a report."""

@@ -26,7 +26,7 @@ from config.errors import InputError
 from config.loading import Schema
 from config.recording import Recording
 from config.valve_file import ValveFile
-from config.writing import valve_toml
+from config.valve_file_writer import valve_toml
 from sim.effect import find_effect
 from workbench.compare.comparison import NUMERICAL, Comparison, compare
 from workbench.data.kept_results import key_of

@@ -16,7 +16,7 @@ from workbench.fleet.engine import TIME_LIMIT_S, cluster, work
 from workbench.fleet.examination import AS_BEFORE, UNREADABLE, Examination, Request, request_key, unreadable
 from workbench.fleet.manifest import Entry, Manifest, read_manifest
 from workbench.fleet.model_changes import ModelChanges, changed_since
-from workbench.fleet.valve_course import ValveCourse, valve_in
+from workbench.fleet.valve_complaints import ValveCourse, valve_in
 
 if TYPE_CHECKING:
     from matplotlib.figure import Figure

@@ -12,8 +12,8 @@ from pathlib import Path
 
 from workbench.fleet.examination import Examination
 from workbench.fleet.fleet import Fleet, since_day
-from workbench.fleet.valve_course import ValveCourse
-from workbench.report import page
+from workbench.fleet.valve_complaints import ValveCourse
+from workbench.report import report_html as page
 from workbench.report.units import OF_VALVE, Shown
 
 WIDTH_PX, HEIGHT_PX, RADIUS_PX = 120, 24, 2

@@ -11,9 +11,9 @@ from typing import TYPE_CHECKING, Any
 
 from config.results.block import Block, Table
 from config.results.result import Result
-from config.writing import valve_toml
+from config.valve_file_writer import valve_toml
 from workbench.fleet.examination import CHANGED
-from workbench.fleet.valve_course import ValveCourse, complaint_of
+from workbench.fleet.valve_complaints import ValveCourse, complaint_of
 
 if TYPE_CHECKING:
     from matplotlib.figure import Figure

@@ -19,7 +19,7 @@ from config.errors import explain_failure
 from config.extras import import_extra
 from config.whole_file import beside
 from workbench.fleet.examination import AS_BEFORE, Examination, unreadable
-from workbench.fleet.valve_course import Model, ValveCourse
+from workbench.fleet.valve_complaints import Model, ValveCourse
 
 Rows = list[Mapping[str, Any]]
 

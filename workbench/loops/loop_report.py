@@ -16,7 +16,7 @@ from workbench.loops.loop_diagnosis import REMEDIES, LoopDiagnosis
 from workbench.loops.loop_record import Array
 from workbench.loops.oscillation import without_trend
 from workbench.loops.plant import Plant
-from workbench.report import page
+from workbench.report import report_html as page
 from workbench.report.charts import EXTENDED, MEASURED, MODEL, QUIET, Figure, axis, layout, line
 from workbench.report.plot_series import draw_series, significant
 from workbench.report.units import Shown

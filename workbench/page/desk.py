@@ -19,7 +19,7 @@ import numpy as np
 from config.errors import InputError
 from config.recording import Column, Recording
 from config.valve_file import find_valve, load_valve, valve_alone
-from config.writing import valve_toml, write_valve
+from config.valve_file_writer import valve_toml, write_valve
 from sim.effect import written_here
 from webpage.units import NO_NUMBER, Units
 from workbench.blind.hiding import hide

@@ -6,7 +6,7 @@ from math import inf
 from pathlib import Path
 from typing import Any
 
-from config.writing import valve_toml
+from config.valve_file_writer import valve_toml
 from sim.effect import tried_effects
 from workbench.page.desk import Desk
 from workbench.page.provenance import Extended, Hidden, NamedValve

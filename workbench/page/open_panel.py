@@ -10,7 +10,7 @@ from nicegui import events, ui
 from config.data_sheet import DataSheet, from_data_sheet
 from config.errors import InputError
 from config.loading import SHIPPED
-from config.writing import write_valve
+from config.valve_file_writer import write_valve
 from webpage.drop_box import drop_box
 from webpage.messages import aside, errors_told, heading, sentences
 from webpage.number_field import NumberField

@@ -12,13 +12,13 @@ The same input, the same bytes. Its files:
     effects_table, effect_ranking          sections that two of them share; which effect lowers the error how far
     overlay, signature_loop                measured and simulated, over time and over the command
     charts, plot_series                    the small plots; what is too long thinned out
-    page, units                            pieces of HTML set into one page; units that people at a plant use
+    report_html, units                     pieces of HTML set into one page; units that people at a plant use
 """
 
 from workbench.report.comparison_report import report_comparison
 from workbench.report.diagnosis_report import report_diagnosis
 from workbench.report.forces_report import report_forces
 from workbench.report.journal_report import report_journal
-from workbench.report.page import Subject, require_plotly
+from workbench.report.report_html import Subject, require_plotly
 
 __all__ = ["Subject", "report_comparison", "report_diagnosis", "report_forces", "report_journal", "require_plotly"]

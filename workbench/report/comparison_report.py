@@ -9,7 +9,7 @@ from config.recording import period_text
 from workbench.compare.comparison import ADEQUATE, Comparison, Phase
 from workbench.compare.comparison_sentences import shorten_notes
 from workbench.compare.measures import fit_in_words
-from workbench.report import page
+from workbench.report import report_html as page
 from workbench.report.charts import MEASURED, MODEL, Figure, correlation, profiles, spectrum
 from workbench.report.overlay import Simulated, overlay, phase_shades
 from workbench.report.plot_series import MOST_SERIES_POINTS, stretch

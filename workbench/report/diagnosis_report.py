@@ -13,7 +13,8 @@ from workbench.data.held_out import Split
 from workbench.diagnosis.diagnosis import Diagnosis
 from workbench.fit.fitted_parameter import Fitted
 from workbench.model.sampling import MORE_LANDINGS
-from workbench.report import effect_ranking, page
+from workbench.report import effect_ranking
+from workbench.report import report_html as page
 from workbench.report.charts import EXTENDED, MODEL, QUIET, axis, layout, line
 from workbench.report.comparison_report import MEANINGS, WORDS, facts, overlaid, recording
 from workbench.report.effects_table import RankedStep, headline, not_told_apart, ranks, show_added, show_tried

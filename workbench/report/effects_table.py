@@ -6,7 +6,7 @@ from dataclasses import dataclass
 from sim.effect import Effect, find_effect
 from workbench.report import effect_ranking
 from workbench.report.effect_ranking import RankedEffect
-from workbench.report.page import Html, Row, keep_lines, plot, section, subheading, table, text
+from workbench.report.report_html import Html, Row, keep_lines, plot, section, subheading, table, text
 from workbench.report.units import Quantity
 from workbench.select.effect_acceptance import LEAST_BIC, LEAST_HELD_OUT
 from workbench.select.equivalence import classes, distinguishing_record

@@ -10,7 +10,8 @@ from workbench.compare.residuals import BINS, FEWEST_BIN_ROWS, Profile, profile
 from workbench.data.imposed_motion import Rows
 from workbench.forces.force_balance import ForceFit, balanced_n, carried_n
 from workbench.forces.force_diagnosis import BALANCE_FLOORS, ForceDiagnosis
-from workbench.report import effect_ranking, page
+from workbench.report import effect_ranking
+from workbench.report import report_html as page
 from workbench.report.charts import EXTENDED, MEASURED, MODEL, QUIET, Figure, axis, layout, line, profiles
 from workbench.report.comparison_report import WORDS
 from workbench.report.diagnosis_report import DIAGNOSIS_WORDS

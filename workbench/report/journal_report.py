@@ -5,7 +5,8 @@ from pathlib import Path
 
 from config.drive import Kind
 from workbench.diagnosis.extension_journal import ExtensionStep, Journal
-from workbench.report import effect_ranking, page
+from workbench.report import effect_ranking
+from workbench.report import report_html as page
 from workbench.report.units import Reading, Shown, times
 
 WORDS = {

@@ -76,7 +76,7 @@ def rms(errors: list[float]) -> float:
 def run_hidden(bus: str, folder: Path, told: Path | None) -> int:
     """Run the act; exit status 1 when the effect is not found or the error does not fall."""
     from config.valve_file import ValveFile, valve
-    from config.writing import write_valve
+    from config.valve_file_writer import write_valve
 
     started_s = time.monotonic()
     bare = valve("seed")
@@ -142,7 +142,7 @@ def _wait(dcs: "Dcs", duration_s: float) -> list[float]:
 def _extend_valve(recording: Path, bare: "ValveFile", better: Path) -> tuple[str, ...]:
     """Diagnose a recording and write the valve file with what it lacked; return that, by name."""
     from config.recording import read_recording
-    from config.writing import write_valve
+    from config.valve_file_writer import write_valve
     from workbench.diagnosis.diagnosis import diagnose
 
     began_s = time.monotonic()

@@ -15,7 +15,7 @@ from typing import ClassVar, NamedTuple, Protocol, Self
 
 from config.codes import InhibitReason
 from config.daemon_file import DaemonFile
-from positioner.control.records import by_name
+from positioner.control.keyword_records import by_name
 from positioner.control.sample import Sample
 from positioner.control.valve_knowledge import ValveKnowledge
 from positioner.estimation.acceptance import Ratios

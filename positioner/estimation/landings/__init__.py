@@ -11,7 +11,7 @@ Neither mass nor viscous friction, lag nor sampling stands in it, and a preload 
     static_law, local_balance         κ, φ_up, φ_down with their deviations; the pressure that lands at a position
     breakaway_distance                how far a slide must be sent to break the stem loose
     extended_balance                  is an extended valve the one that is there
-    swing                             how far past its balance a stem swings and sticks there
+    overshoot                         how far past its balance a stem swings and sticks there
     packing_compliance                how far the packing of a stuck stem gives way
     change_point                      the instant that parts landings best
     landing_shift                     was the sensor shifted while landings were gathered

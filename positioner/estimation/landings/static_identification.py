@@ -21,10 +21,10 @@ from positioner.estimation.landings.extended_balance import contradicted
 from positioner.estimation.landings.landing_detector import Answers, LandingDetector, SlideOutcome, Supposed
 from positioner.estimation.landings.landing_shift import shifted
 from positioner.estimation.landings.local_balance import LocalBalance
+from positioner.estimation.landings.overshoot import balanced
 from positioner.estimation.landings.packing_compliance import compliance
 from positioner.estimation.landings.pressure_delivered import PressureDelivered
 from positioner.estimation.landings.static_law import StaticLaw, no_static_law, static_law
-from positioner.estimation.landings.swing import balanced
 
 LONGEST_WAY, OFF, LIKE = 0.03, 1e-3, 0.15
 """Of the stroke: a stuck stem gives way no farther; a slide may land so far from where it should, or by a share of its

@@ -38,7 +38,7 @@ from positioner.estimation.estimates import Estimate, no_estimate
 from positioner.estimation.landings.change_point import FINEST
 from positioner.estimation.landings.landing_detector import SlideOutcome
 from positioner.estimation.landings.local_balance import LocalBalance
-from positioner.estimation.landings.swing import balanced, swing_of
+from positioner.estimation.landings.overshoot import balanced, swing_of
 
 FEWEST_LANDINGS, FEWEST_EACH = 5, 2
 """Landings in all, and in each direction."""

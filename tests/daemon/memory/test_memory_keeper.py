@@ -12,7 +12,7 @@ from config.codes import Restored
 from config.daemon_file import DaemonFile
 from config.errors import InputError
 from positioner.control.controller_memory import Decision
-from positioner.control.restoration import Restoration
+from positioner.control.restored_knowledge import Restoration
 from positioner.control.valve_knowledge import ValveKnowledge
 from positioner.daemon.keeping_thread import WRITE_EVERY_CHECKS
 from positioner.daemon.memory import MemoryKeeper, StoredMemory

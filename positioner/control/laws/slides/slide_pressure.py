@@ -23,7 +23,7 @@ class Balance(LocalBalance):
 
     held: tuple[SlideOutcome, ...]
     swing: float = 0.0
-    """ρ, share of its way by which the stem swings past its balance (estimation/landings/swing.py)."""
+    """ρ, share of its way by which the stem swings past its balance (estimation/landings/overshoot.py)."""
 
     def slide_pa(self, from_m: float, to_m: float, direction: int) -> float:
         """Return the pressure under which a slide from rest ends at a place, Pa: at its balance, or swung past it."""

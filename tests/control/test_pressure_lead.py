@@ -5,7 +5,7 @@ from math import exp
 import pytest
 
 from config.extended_valve import Inverse
-from positioner.control.pressure_path import PathMemory, after_step, long_held
+from positioner.control.pressure_lead import PathMemory, after_step, long_held
 
 H = 0.02
 LIMITS_PA = (0.0, 4e5)

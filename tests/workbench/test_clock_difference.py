@@ -9,7 +9,7 @@ from config.recording import Column, Recording
 from config.valve_file import ValveFile
 from tests.workbench.slow_records import SPAN_PA, once_a_second
 from tests.workbench.valves import NOISE_M, SEED, with_effect
-from workbench.data.clocks import Early
+from workbench.data.clock_difference import Early
 from workbench.data.noise_floor import with_noise
 from workbench.data.record import ready
 from workbench.diagnosis.diagnosis import diagnose
