@@ -15,7 +15,7 @@ A motion one way, s, says φ_s alone. Of a valve of which the other was known be
     φ'_-s = φ_-s φ'_s/φ_s           all of it grows
 
 and where the two differ by more than 5 % of φ'_s, φ_-s is not known any more. Where nothing was known, φ_-s = φ_s is
-a guess. What is not known is a direction (`Ratios.directions`), in which the first landing (`unseen_direction`) tells it.
+a guess. Of a direction that is not known (`Ratios.directions`) the first landing tells it (`unseen_direction`).
 """
 
 from dataclasses import dataclass, replace
