@@ -218,8 +218,7 @@ def _direction(valve: Watching, bounds: Bounds, start_pa: float, moved_m: float,
 def _ramps(
     valve: Watching, bounds: Bounds, start_pa: float, sign: float, show: Callable[[str], None]
 ) -> list[Recording]:
-    short = replace(bounds, longest_s=min(bounds.longest_s, signature.time_limit_s(THRESHOLDS.commissioning_leg_s)))
-    slow, _, fast = signature.programmes(short, start_pa)
+    slow, _, fast = signature.programmes(bounds, start_pa)
     return [_mirrored(_played(valve, each, show), sign) for each in (slow, fast)]
 
 

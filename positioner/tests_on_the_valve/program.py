@@ -58,10 +58,11 @@ class Program:
 
 @dataclass(frozen=True, slots=True)
 class Leap:
-    """The next command of a sequence, Pa, and how long it is held, s."""
+    """The next command of a sequence, Pa, how long it is held, s, and the rate of the way there if it has its own."""
 
     to_pa: float
     held_s: float
+    rate_pa_per_s: float | None = None
 
 
 @dataclass(frozen=True, slots=True)
@@ -102,12 +103,13 @@ def ramped(
     turn_m: float = 0.0,
     band_m: float = 0.0,
 ) -> Program:
-    """Return a program that begins at the command in force and goes from leap to leap at one rate."""
+    """Return a program that begins at the command in force; leaps without a rate have this one."""
     points = [(0.0, start_pa)]
     for leap in leaps:
         time_s, before_pa = points[-1]
         if leap.to_pa != before_pa:
-            time_s += max(SHORTEST_S, abs(leap.to_pa - before_pa) / rate_pa_per_s) + 2.0 * FLOAT32 * time_s
+            way_s = abs(leap.to_pa - before_pa) / (leap.rate_pa_per_s or rate_pa_per_s)
+            time_s += max(SHORTEST_S, way_s) + 2.0 * FLOAT32 * time_s
             points.append((time_s, leap.to_pa))
         if leap.held_s > 0.0:
             points.append((time_s + leap.held_s, leap.to_pa))

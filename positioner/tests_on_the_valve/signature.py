@@ -37,8 +37,10 @@ from positioner.tests_on_the_valve.program import Bounds, Leap, Program, ramped
 from positioner.tests_on_the_valve.ramps import Leg, Line, Ramps, difference, legs_of, ramps_of, scaled
 from positioner.tests_on_the_valve.thresholds import THRESHOLDS
 
-LEGS = 4
-"""From the command in force to the least one, up, down, and back."""
+LEGS = 2.0 * (1.0 + 1.0 / THRESHOLDS.least_rate_ratio)
+"""Up and down, and at the fast rate from the command in force to the least one and back: as long as slow legs."""
+HOLDS = 4
+"""After each of them."""
 DECILES = tuple(0.1 * each for each in range(1, 10))
 
 
@@ -58,7 +60,8 @@ class Nameplate:
 def programmes(bounds: Bounds, start_pa: float, source: str = "experiment") -> tuple[Program, ...]:
     """Return the slow ramps, twice, and the fast ones, each a program of its own, as slow as the time limit permits.
 
-    From the command in force to the least one, up, down, and back; the fast ones go up and down twice.
+    From the command in force to the least one, up, down, and back; the fast ones go up and down twice. The ways there
+    and back are fast, for they show nothing: the faster a force grows, the less of it breaks a stem loose.
 
     Raises:
         InputError: the time limit leaves no time for slow ramps; names the source.
@@ -75,17 +78,18 @@ def programmes(bounds: Bounds, start_pa: float, source: str = "experiment") -> t
     fast_s = max(fast_s, span_pa / bounds.rate_pa_per_s)
     first, last = Leap(bounds.minimum_pa, held_s), Leap(start_pa, held_s)
     up_and_down = (Leap(bounds.maximum_pa, held_s), first)
-    slow = ramped("slow ramps", start_pa, (first, *up_and_down, last), span_pa / slow_s)
+    slowly = tuple(replace(each, rate_pa_per_s=span_pa / slow_s) for each in up_and_down)
+    slow = ramped("slow ramps", start_pa, (first, *slowly, last), span_pa / fast_s)
     return slow, slow, ramped("fast ramps", start_pa, (first, *2 * up_and_down, last), span_pa / fast_s)
 
 
 def time_limit_s(leg_s: float) -> float:
     """Return the time limit within which slow ramps take so long a leg, s."""
-    return LEGS * leg_s / THRESHOLDS.of_time_limit + (LEGS + 1) * THRESHOLDS.end_held_s
+    return LEGS * leg_s / THRESHOLDS.of_time_limit + HOLDS * THRESHOLDS.end_held_s
 
 
 def _leg_s(limit_s: float) -> float:
-    return THRESHOLDS.of_time_limit * (limit_s - (LEGS + 1) * THRESHOLDS.end_held_s) / LEGS
+    return THRESHOLDS.of_time_limit * (limit_s - HOLDS * THRESHOLDS.end_held_s) / LEGS
 
 
 def signature(recordings: "list[Recording]", plate: Nameplate) -> Outcome:

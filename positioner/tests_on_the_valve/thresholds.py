@@ -110,8 +110,6 @@ class Thresholds:
     """Before anything moves, for noise, digit and creep."""
     creep_s: float = 30.0
     """From the least command to the most, while the direction is sought."""
-    commissioning_leg_s: float = 40.0
-    """Of a slow ramp in commissioning, which has five minutes for all."""
     stroke_held_s: float = 6.0
     """At each end, for a stroke to be over."""
     leak_s: float = 12.0
