@@ -86,6 +86,7 @@ class Fault(Code):
         15,
         "the daemon itself: its command was no finite number and was not given",
     )
+    COMMUNICATION_LOST = 16, "the device heard no command for its own time-out, and acted by itself"
 
 
 class Quality(Code):

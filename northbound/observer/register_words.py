@@ -6,7 +6,7 @@ from dataclasses import dataclass
 
 from config.codes import EventKind, Fault, cause_text
 from config.quantities import DeviceStatus
-from config.registers import BY_NAME, ESTIMATED, REGISTERS
+from config.registers import BY_NAME, ESTIMATED, REGISTERS, STATISTICS
 from fieldbus.canopen.emergencies import cause_of
 
 CODES = {register.name: register.codes for register in REGISTERS if register.codes is not None}
@@ -16,6 +16,8 @@ CAUSE_BITS = {"ne107_causes": 0, "ne107_causes_high": 16} | dict.fromkeys(
     ("alarms_active", "alarms_unacknowledged", "alarms_shelved"), 0
 )
 """Registers whose bit n - 1 is a cause of `ne107_cause`: n less the cause."""
+COUNTED = {register.name: register.text for register in STATISTICS if register.type == "uint32"}
+"""What each count is of."""
 SWITCHES = {"eta_": ("on", "off"), "_valid": ("not valid", "valid")}
 """What 0 and 1 mean, of registers by a part of their name."""
 
@@ -68,25 +70,31 @@ def ne107_causes(low: float, high: float = 0) -> list[str]:
 
 
 def device_status(word: float, fault: float = Fault.NONE) -> str:
-    """Return what the device says of itself; beside the fault by which it said otherwise before, that this is over.
+    """Return what the device says of itself, beside the fault by which it said otherwise, or nothing, before.
 
     >>> device_status(0), device_status(6)
     ('healthy', 'sensor fault, not ready')
     >>> device_status(0, Fault.DEVICE)
     'healthy again; its fault is latched until it is acknowledged'
+    >>> device_status(0, Fault.NO_REPLY)
+    'healthy when it last answered'
     """
     number = int(word) if math.isfinite(word) else 0
     said = [(each.name or "").lower().replace("_", " ") for each in DeviceStatus if number & each]
-    if not said and fault == Fault.DEVICE:
+    if not said and fault in (Fault.DEVICE, Fault.COMMUNICATION_LOST):
         return "healthy again; its fault is latched until it is acknowledged"
+    if not said and fault == Fault.NO_REPLY:
+        return "healthy when it last answered"
     return ", ".join(said) or "healthy"
 
 
 def in_words(register: str, value: float, values: Mapping[str, float]) -> str:
-    """Return what a register's number means, among others read with it; empty where it is a number and no more.
+    """Return what a register's number means, among others read with it; empty of a measured value.
 
     >>> in_words("mode", 2, {}), in_words("b_reason", 0, {}), in_words("position", 0.5, {})
     ('automatic', 'valid', '')
+    >>> in_words("lost_replies", 3, {})
+    'transactions without a good answer'
     >>> in_words("emergency", 0x2310, {}), in_words("emergency", 0, {})
     ('0x2310: current', 'none')
     >>> in_words("eta_1", 0, {}), in_words("ne107_causes_high", 1, {}), in_words("event_cause", 2, {"event": 7})
@@ -94,6 +102,8 @@ def in_words(register: str, value: float, values: Mapping[str, float]) -> str:
     """
     if register in CODES:
         return code_text(register, value)
+    if register in COUNTED:
+        return COUNTED[register]
     if register in CAUSE_BITS:
         return ", ".join(ne107_causes(int(value) << CAUSE_BITS[register])) or "none"
     if register == "device_status":

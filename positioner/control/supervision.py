@@ -168,8 +168,8 @@ def _cause(
         return Fault.RESTARTED
     if bad_in_a_row >= limits.lost_after_cycles:
         return Fault.NO_REPLY if unheard else Fault.IMPLAUSIBLE
-    if sample.status & UNFIT_STATUS and sample.quality is not LOST:
-        return Fault.DEVICE
+    if (unfit := sample.status & UNFIT_STATUS) and sample.quality is not LOST:
+        return Fault.COMMUNICATION_LOST if unfit == DeviceStatus.COMMUNICATION_LOST else Fault.DEVICE
     if age_s > limits.stale_after_s:  # on a slow line sooner than so many cycles
         by_quality = {LOST: Fault.NO_REPLY, NO_NUMBER: Fault.IMPLAUSIBLE}
         return by_quality.get(sample.quality, Fault.STALE)

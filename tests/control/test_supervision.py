@@ -100,7 +100,14 @@ def test_an_impossible_position_counts_as_no_measurement(position_m: float) -> N
 
 @pytest.mark.parametrize("status", list(DeviceStatus))
 def test_an_unfit_device_is_a_fault_at_once(status: DeviceStatus) -> None:
-    assert faults(watched([good(0.0)._replace(status=status)], AUTOMATIC)) == [Fault.DEVICE]
+    alone = status is DeviceStatus.COMMUNICATION_LOST
+    expected = Fault.COMMUNICATION_LOST if alone else Fault.DEVICE
+    assert faults(watched([good(0.0)._replace(status=status)], AUTOMATIC)) == [expected]
+
+
+def test_a_device_that_is_unfit_and_was_alone_is_unfit() -> None:
+    both = DeviceStatus.COMMUNICATION_LOST | DeviceStatus.SENSOR_FAULT
+    assert faults(watched([good(0.0)._replace(status=both)], AUTOMATIC)) == [Fault.DEVICE]
 
 
 @pytest.mark.parametrize(("held_pa", "fault"), [(50e3, Fault.NONE), (50.3e3, Fault.NONE), (0.0, Fault.RESTARTED)])
