@@ -102,8 +102,6 @@ def in_words(register: str, value: float, values: Mapping[str, float]) -> str:
     """
     if register in CODES:
         return code_text(register, value)
-    if register in COUNTED:
-        return COUNTED[register]
     if register in CAUSE_BITS:
         return ", ".join(ne107_causes(int(value) << CAUSE_BITS[register])) or "none"
     if register == "device_status":
@@ -114,7 +112,7 @@ def in_words(register: str, value: float, values: Mapping[str, float]) -> str:
         kind = int(values.get("event", EventKind.NONE))
         return cause_text(EventKind(kind), int(value)) if kind in list(EventKind) else ""
     switch = next((words for part, words in SWITCHES.items() if part in register), ("", ""))
-    return switch[bool(value)]
+    return switch[bool(value)] or COUNTED.get(register, "")
 
 
 def estimates_in_words(values: Mapping[str, float]) -> Iterator[EstimateInWords]:

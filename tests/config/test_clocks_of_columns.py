@@ -254,5 +254,16 @@ def test_what_stands_where_a_clock_has_its_unit_is_said_with_what_is_taken(tmp_p
     assert said.startswith("the unit of 'Name' is 'SymbolName' by the file, none known: s is taken; :ms")
 
 
+@pytest.mark.parametrize("labels", [("SymbolName", "SampleTime[ms]"), ("SampleTime [ms]", "Unit")])
+def test_a_clock_goes_by_the_unit_in_what_describes_it(labels: tuple[str, str], tmp_path: Path) -> None:
+    """A scope's clock has the labels of its signals in its column, among them `SampleTime[ms]`."""
+    lines = (f"{1e3 * t:.1f}\t{x}\t{x / 50}" for t, x in zip(STEM_S, STEM_MM, strict=True))
+    below = [f"{labels[0]}\tMAIN.x\tMAIN.u", f"{labels[1]}\tmm\tbar"]
+    (tmp_path / "a.csv").write_text("\n".join(["Name\txStem\tuCmd", *below, *lines]))
+    assert "time_s=Name:ms" in preview(tmp_path / "a.csv").words
+    sources = read_mapping(["time_s=Name", "position_m=xStem", "command_pa=uCmd"])
+    np.testing.assert_allclose(read_export(tmp_path / "a.csv", sources, None).time_s, STEM_S - STEM_S[0])
+
+
 def day(times_s: np.ndarray) -> list[str]:
     return [(BEGIN + datetime.timedelta(seconds=float(t))).strftime("%d.%m.%Y %H:%M:%S") for t in times_s]

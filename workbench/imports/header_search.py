@@ -14,7 +14,7 @@ from pathlib import Path
 
 from config.errors import InputError
 from workbench.imports.cell_kinds import begins_number, may_be_clock
-from workbench.imports.cell_units import unit_in_header, unit_named
+from workbench.imports.cell_units import UNITS, unit_in_header, unit_named
 from workbench.imports.column_names import rank_by_name
 from workbench.imports.raw_table import Cell, RawTable
 
@@ -197,11 +197,17 @@ def with_units(header: Header) -> Header:
             continue
         for name, (first, *_) in header.at.items():
             text = str(cells[first]) if first < len(cells) else ""
-            if unit := unit_named(text):
+            if unit := unit_named(text) or _unit_of_time_in(text):
                 units.setdefault(name, (unit, line))
             elif text:
                 unknown.setdefault(name, text)
     return replace(header, samples_after=last, units=units, unknown=unknown)
+
+
+def _unit_of_time_in(text: str) -> str | None:
+    """Return the unit in which a clock's column is described: TwinCAT writes `SampleTime[ms]` into it."""
+    unit = unit_in_header(text)[1]
+    return unit if unit in UNITS["_s"] else None
 
 
 def _from(table: RawTable, line: int, count: int) -> Iterator[tuple[int, list[Cell]]]:
