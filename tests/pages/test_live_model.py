@@ -73,8 +73,8 @@ def test_a_slider_goes_as_far_as_such_a_valve_may_and_a_number_as_far_as_is_phys
     ends = [live.value_at(moved, share) for share in (0.0, 1.0)]
     assert ends == pytest.approx([-0.12 * valve.stroke_m, 0.12 * valve.stroke_m])
     assert live.value_at(coulomb, 1.0) == pytest.approx(10.0 * valve.coulomb_n)
-    live.put(moved, 0.5)
-    assert live.value(moved) == pytest.approx(0.5)
+    live.put(moved, 500.0, per_si=1e3)
+    assert live.value(moved) == 0.5, "as typed, in mm"
     assert live.share(moved) == 1.0, "the slider stands at its end"
     live.put(coulomb, 1000.0)
     assert live.value(static) / live.value(coulomb) == pytest.approx(valve.static_n / valve.coulomb_n)
@@ -83,6 +83,8 @@ def test_a_slider_goes_as_far_as_such_a_valve_may_and_a_number_as_far_as_is_phys
     for name, value in (("static_n", 900.0), ("mass_kg", -1.0), ("sensor_offset.offset_m", 11.0)):
         with pytest.raises(InputError, match=rf"{name}: allowed is .* to .*, got {value:g}"):
             live.put(live.parameters[name], value)
+    with pytest.raises(InputError, match=r"allowed is -1e\+04 to 1e\+04, got 11000"):
+        live.put(moved, 11e3, per_si=1e3)
     assert live.undo()
     assert live.value(static) == pytest.approx(1000.0 * valve.static_n / valve.coulomb_n)
 

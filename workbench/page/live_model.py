@@ -88,20 +88,21 @@ class LiveModel:
         _put(theta, parameter, share)
         return float(theta[parameter.index])
 
-    def put(self, parameter: Parameter, value: float) -> None:
-        """Set a parameter to a value, SI.
+    def put(self, parameter: Parameter, value: float, per_si: float = 1.0) -> None:
+        """Set a parameter to a value in a unit of which so many are one of SI.
 
         Raises:
             InputError: it is beyond the physical range; says what is allowed.
         """
         physical, theta = self._physical[parameter.name], np.array(self.setting.theta)
         coulomb_n = float(theta[BASE.index("coulomb_n")]) if parameter.name == "static_n" else 1.0
-        least, most = coulomb_n * physical.least, coulomb_n * physical.most
+        least, most = (per_si * coulomb_n * each for each in (physical.least, physical.most))
         if not least <= value <= most:
             raise InputError(parameter.name, f"allowed is {least:.4g} to {most:.4g}, got {value:.6g}")
         there = np.array(theta)
-        there[parameter.index] = value
+        there[parameter.index] = value / per_si
         physical.put(theta, physical.coordinate(there))  # sliding friction takes the static along
+        theta[parameter.index] = value / per_si
         self.keep()
         self.setting = replace(self.setting, theta=theta)
 

@@ -100,7 +100,7 @@ class Sliders:
                         f'dense outlined placeholder="type" data-testid="type-{parameter.name}" aria-label="{words}"'
                     )
                     typed.props(remove="label").classes("typed").style("width: 72px").on(
-                        "keydown.enter", lambda: self._handle_text(parameter, typed, factor)
+                        "keydown.enter", lambda: self._handle_text(parameter, typed, factor, unit)
                     )
             slider = Slider(self._live.share(parameter), parameter.name, words)
             low, high = (factor * self._live.value_at(parameter, share) for share in (0.0, 1.0))
@@ -126,13 +126,14 @@ class Sliders:
         self._show_values()
         self._moved()
 
-    async def _handle_text(self, parameter: Parameter, typed: NumberField, factor: float) -> None:
-        """Take a number that was typed beside a slider."""
-        with errors_told({parameter.name: f"{in_words(parameter.name)[0]}, SI"}):
+    async def _handle_text(self, parameter: Parameter, typed: NumberField, factor: float, unit: str) -> None:
+        """Take a number that was typed beside a slider, in the unit that stands there."""
+        words = in_words(parameter.name)[0]
+        with errors_told({parameter.name: f"{words}, {unit}" if unit else words}):
             value = typed.number()
             if value is None:
                 return
-            self._live.put(parameter, value / factor)
+            self._live.put(parameter, value, factor)
             typed.set_value("")
             self._held = False
             self._follow()
