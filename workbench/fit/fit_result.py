@@ -46,11 +46,6 @@ class Term(NamedTuple):
     independent: float
     mean_square: float
 
-    @property
-    def evidence(self) -> float:
-        """That more than the noise is left."""
-        return self.independent * log(self.mean_square)
-
 
 NO_TERM = Term(0.0, 1.0)
 """Of a kind without residuals."""
@@ -265,16 +260,15 @@ class Counted(NamedTuple):
 def terms(like: Likelihood, counted: Counted, moved: Vector | None = None) -> Terms:
     """Return what the residuals say, kind by kind; and how far the parameters had to go for them, in deviations.
 
-    Samples in motion that hang together count for fewer, a move for one witness at the least; landings are as many as
-    they are. A rest is one witness, however long, and a break-away, however wrong: what one event gets wrong, a model
-    of all the others need not know.
+    Samples in motion that hang together count for fewer, a move for one witness at the least; landings and break-aways
+    are as many as they are. A rest is one witness, however long: one that a model gets wrong is one event.
     """
     scale, (motion, landings, rests, break_aways) = like.weights.soft, counted.groups
     return Terms(
         _term(motion, scale, max(independent_share(motion) * motion.size, counted.moves)),
         _term(landings, scale, landings.size),
-        _term_of_events(rests, counted.rest_of, scale),
-        _term_of_events(break_aways, np.arange(break_aways.size), scale),
+        _term_of_rests(rests, counted.rest_of, scale),
+        _term(break_aways, scale, break_aways.size),
         NO_TERM if moved is None else _term(moved, scale, moved.size),
     )
 
@@ -288,11 +282,11 @@ def _term(r: Vector, scale: float, independent: float) -> Term:
     return Term(independent, max(1.0, 2.0 * float(soft(r, scale).mean()))) if r.size else NO_TERM
 
 
-def _term_of_events(r: Vector, event_of: Rows, scale: float) -> Term:
-    """Return the term of events, one witness each: the geometric mean of the mean squares of each."""
+def _term_of_rests(r: Vector, rest_of: Rows, scale: float) -> Term:
+    """Return the term of rests: the geometric mean of the mean squares of each."""
     if not r.size:
         return NO_TERM
-    _, of = np.unique(event_of, return_inverse=True)
+    _, of = np.unique(rest_of, return_inverse=True)
     squares = np.bincount(of, 2.0 * soft(r, scale)) / np.bincount(of)
     return Term(float(squares.size), float(np.exp(np.mean(np.log(np.maximum(squares, 1.0))))))
 

@@ -53,6 +53,8 @@ class Weights:
     """Residuals beyond which one counts by its amount alone: a wild sample is no evidence."""
     beside: int = 3
     """Samples before and after a move that count one by one: each speaks against one that is early or late."""
+    gone: float = 12.0
+    """Noises that a stem goes from its rest that has broken loose: by less a packing yields, or a thread creeps."""
     wild: float = 1e6
     """Residual of a sample where the model has no answer."""
 
@@ -128,7 +130,8 @@ def layout(record: Record, told: tuple[ToldMove, ...], weights: Weights = WEIGHT
         (int(np.searchsorted(moving, first_in_motion(each))), int(np.searchsorted(moving, last_in_motion(each) + 1)))
         for each in told
     )
-    broken = np.array([k for k, each in enumerate(told) if not each.begins_in_motion], dtype=np.int64)
+    gone = weights.gone * record.scale_m
+    broken = np.array([k for k, each in enumerate(told) if each.breaks_loose(record, gone)], dtype=np.int64)
     of_moving = np.full(moving.size, len(told), dtype=np.int64)
     for k, (first, end) in enumerate(in_motion):
         of_moving[first:end] = k

@@ -44,6 +44,11 @@ class ToldMove:
     never_rests: bool
     """Whether it is all that its segment shows."""
 
+    def breaks_loose(self, record: Record, gone_m: float) -> bool:
+        """Whether it begins at rest, and goes farther than this, m: what creeps has not broken loose."""
+        span_m = record.position_m[self.before : self.after + 1][record.valid[self.before : self.after + 1]]
+        return not self.begins_in_motion and span_m.size > 0 and float(np.ptp(span_m)) > gone_m
+
 
 @dataclass(frozen=True, slots=True, repr=False)
 class ToldPath(Brief):
