@@ -49,16 +49,18 @@ class ExtensionStep(Schema):
             f"{length.number(before.test_block_m, '.4g')} to {length.said(after.test_block_m, '.4g')}, "
             f"held-out evidence {found.held_out_evidence:.3g}"
         )
+        floor_m = extension.split.floor_m
+        left = "" if floor_m is None else f"; {after.rms_floors(floor_m):.3g} times the floor is left"
         return cls(
             effects=extension.effects,
-            why=said if extension.effects else "the parameters were wrong",
+            why=said if extension.effects else f"parameters alone were changed{left}",
             given_train_rmse_m=extension.given_train_rmse_m,
             given_test_rmse_m=extension.given_test_rmse_m,
             refitted_train_rmse_m=before.train_rmse_m,
             refitted_test_rmse_m=before.test_rmse_m,
             extended_train_rmse_m=after.train_rmse_m,
             extended_test_rmse_m=after.test_rmse_m,
-            floor_m=extension.split.floor_m,
+            floor_m=floor_m,
             parameters={name: each.value for name, each in extension.extended.parameters.items()},
         )
 
