@@ -77,8 +77,7 @@ def test_without_an_effect_the_valve_is_refitted_as_it_is(tmp_path: Path, capsys
     assert step.effects == ()
     assert step.extended_test_rmse_m < 0.1 * step.given_test_rmse_m
     report_journal(Journal.beside(tmp_path / "own.toml"), tmp_path / "own.html", "own", BARE.valve.own)
-    (step,) = Journal.beside(tmp_path / "own.toml").steps
-    assert "times the floor is left" in step.why, "a lag is missing: nothing says that parameters were wrong"
+    assert "times the floor is left" in step.why, "what is left says whether parameters alone were wrong"
     assert "Step 1: refitted, nothing added" in (tmp_path / "own.html").read_text(encoding="utf-8")
 
 
