@@ -169,6 +169,19 @@ def test_what_imitated_two_is_idle_beside_both_and_left_out(searched: Searched) 
     assert added(searched(ends, *imitations, "ip_lag", "asymmetric_friction")) == ["asymmetric_friction", "ip_lag"]
 
 
+def test_an_answer_of_three_whose_second_was_no_candidate_at_first_is_read_as_it_is(searched: Searched) -> None:
+    """A hysteresis comes after presliding, which showed behind the lag alone: there is no model of it alone."""
+
+    def ends(there: Effects) -> float:
+        if "ip_lag" not in there:
+            return 20.0
+        left = 3.0 if "presliding_hysteresis" in there else 5.0 if "presliding" in there else 8.0
+        return left * (0.34 if "backlash" in there and left == 3.0 else 1.0)
+
+    found = added(searched(ends, "ip_lag", "presliding", "presliding_hysteresis", "backlash"))
+    assert found == ["ip_lag", "presliding_hysteresis", "backlash"]
+
+
 def test_what_is_far_behind_is_not_searched_to_its_end(searched: Searched) -> None:
     floors = {"ip_lag": 1.0, "backlash": 1.5, "stribeck": 9.0, "quadratic_drag": 10.0, "friction_drift": 18.0}
     (step,) = searched(lambda there: min((floors[each] for each in there), default=100.0), *floors)

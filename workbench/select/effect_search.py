@@ -157,7 +157,7 @@ class EffectSearch:
         if len(names) < MOST_ADDED:
             return None
         _, second, third = names
-        alone = self._rounds[()].models[second]
+        alone = self._rounds[()].models.get(second, "comes after another")
         tried = {frozenset((*added, name)) for added, here in self._rounds.items() for name in here.models}
         return None if isinstance(alone, str) or {second, third} in tried else _Round(alone, (second,))
 
