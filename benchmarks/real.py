@@ -19,6 +19,7 @@ from config.recording import Recording
 from config.valve_file import ValveFile, load_valve, shipped_valve
 from workbench.data.imposed_motion import read_imposed
 from workbench.diagnosis.diagnosis import diagnose
+from workbench.fit.fit_result import Fit
 from workbench.fit.fitting import fit
 from workbench.forces.force_diagnosis import ForceDiagnosis, diagnose_forces
 from workbench.imports.column_mapping import read_mapping
@@ -101,15 +102,19 @@ def first_half_of_plant_valve() -> tuple[Recording, Recording]:
     return whole, Recording({name: column[: len(whole) // 2] for name, column in whole.columns.items()})
 
 
+def plant_valve_off(whole: Recording, found: Fit) -> tuple[float, float]:
+    """Return what a free run is off by in the first half of the recording and in the second, shares of the stroke."""
+    off = (found.predict(whole) - whole.columns["position_m"]) / PLANT.valve.stroke_m
+    first, second = (float(np.sqrt(np.nanmean(half**2))) for half in np.array_split(off, 2))
+    return first, second
+
+
 def plant_valve() -> Iterator[str]:
     """Yield the figures of the plant valve, % of a stroke taken for 100 mm; spring and area are the shipped valve's."""
     whole, first = first_half_of_plant_valve()
     found = fit(first, PLANT)
-    off_percent = 100.0 / PLANT.valve.stroke_m * (found.predict(whole) - whole.columns["position_m"])
-    fitted, held_out = (
-        np.sqrt(np.nanmean(off_percent[rows] ** 2)) for rows in (slice(len(first)), slice(len(first), None))
-    )
-    yield f"  {fitted:.3g} % rms fitted, {held_out:.3g} % held out, of a free run"
+    fitted, held_out = plant_valve_off(whole, found)
+    yield f"  {100 * fitted:.3g} % rms fitted, {100 * held_out:.3g} % held out, of a free run"
     yield "  " + ", ".join(f"{name} {each.value:.4g}" for name, each in found.parameters.items())
 
 

@@ -22,7 +22,21 @@ STROKE_M = 0.1016
 LAW = {"b_over_c_pa_per_m": -814e3, "k_over_c_pa": -22e3}
 
 
-class Panel:
+class ByName:
+    """A daemon's registers, read and written by their names."""
+
+    registers: SupervisoryRegisters
+
+    def get(self, name: str) -> float:
+        register = BY_NAME[name]
+        return register.format.decode(self.registers.read("holding", register.address, register.format.words))
+
+    def set(self, name: str, value: float) -> None:
+        register = BY_NAME[name]
+        self.registers.write(register.address, register.format.encode(value), "test")
+
+
+class Panel(ByName):
     """Registers of a daemon on a virtual valve, by name."""
 
     def __init__(self, tables: Mapping[str, object] | None = None) -> None:
@@ -39,14 +53,6 @@ class Panel:
         self.cycle: Cycle = virtual_cycle(daemon, device_of(slave, shipped_valve("seed")), Requests())
         path = SignalPath.of(daemon.travel)
         self.registers = SupervisoryRegisters(self.cycle, Travel(STROKE_M), 0.0, 200e3, path=path)
-
-    def get(self, name: str) -> float:
-        register = BY_NAME[name]
-        return register.format.decode(self.registers.read("holding", register.address, register.format.words))
-
-    def set(self, name: str, value: float) -> None:
-        register = BY_NAME[name]
-        self.registers.write(register.address, register.format.encode(value), "test")
 
     def run(self, cycles: int = 1) -> None:
         for _ in range(cycles):

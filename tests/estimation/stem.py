@@ -8,9 +8,11 @@ import numpy as np
 import numpy.typing as npt
 from scipy.linalg import expm
 
+from config.valve_file import load_valve, shipped_valve
 from positioner.estimation.estimates import Estimates
 from positioner.estimation.online import Identification, IdentificationSettings
 from positioner.estimation.refiner import InProcessRefiner, Refinement
+from sim.valve import Valve
 
 Array = npt.NDArray[np.float64]
 
@@ -103,6 +105,15 @@ class Refined(Identification):
         if (job := self.taken_job()) is not None:
             self._refiner.submit(job)
         return estimates
+
+
+def rested() -> tuple[Valve, Refined]:
+    """Return the seed's simulated valve at rest, and an identification of it that has just begun."""
+    valve = Valve.from_file(load_valve(shipped_valve("seed")))
+    valve.rest_at(0.05)
+    identification = Refined(IdentificationSettings(stroke_m=STROKE, pressure_pa=4e5))
+    identification.restart()
+    return valve, identification
 
 
 def feed(identification: Identification, run: Run, *, parameters: bool = True, friction: bool = True) -> None:

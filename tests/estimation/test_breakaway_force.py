@@ -6,12 +6,9 @@ import numpy as np
 import pytest
 
 from config.codes import Refusal
-from config.valve_file import load_valve, shipped_valve
 from positioner.estimation.breakaway_force import after_event, from_interval, intersection, with_validity
 from positioner.estimation.estimates import Estimate, no_estimate
-from positioner.estimation.online import IdentificationSettings
-from sim.valve import Valve
-from tests.estimation.stem import AREA, COULOMB, NOISE, SPRING, STATIC, STROKE, Refined
+from tests.estimation.stem import AREA, COULOMB, NOISE, SPRING, STATIC, STROKE, rested
 
 PERIOD_S, EVERY_S = 2e-3, 20.0
 
@@ -48,11 +45,8 @@ def test_what_is_known_ages_and_a_move_without_an_event_takes_nothing_away() -> 
 
 @pytest.mark.parametrize("ramp_s", [0.2, 0.0], ids=["ramps", "jumps"])
 def test_ordinary_moves_tell_the_static_friction_if_they_begin_slowly(ramp_s: float) -> None:
-    valve = Valve.from_file(load_valve(shipped_valve("seed")))
-    valve.rest_at(0.05)
+    valve, identification = rested()
     pressure_pa, rng = valve.pressure_pa, np.random.default_rng(0)
-    identification = Refined(IdentificationSettings(stroke_m=STROKE, pressure_pa=4e5))
-    identification.restart()
     for move in range(8):
         target_m = STROKE * float(rng.uniform(0.3, 0.8))
         direction = 1 if target_m > valve.position_m else -1

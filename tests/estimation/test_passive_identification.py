@@ -3,20 +3,14 @@
 import numpy as np
 import pytest
 
-from config.valve_file import load_valve, shipped_valve
-from positioner.estimation.online import IdentificationSettings
-from sim.valve import Valve
-from tests.estimation.stem import AREA, COULOMB, NOISE, SPRING, STATIC, STROKE, Refined
+from tests.estimation.stem import AREA, COULOMB, NOISE, SPRING, STATIC, STROKE, rested
 
 PERIOD_S, MOVES, EVERY_S = 2e-3, 30, 20.0
 
 
 def test_friction_that_drifts_by_30_percent_in_10_minutes_is_followed_within_3_percent() -> None:
-    valve = Valve.from_file(load_valve(shipped_valve("seed")))
-    valve.rest_at(0.05)
+    valve, identification = rested()
     pressure_pa, rng = valve.pressure_pa, np.random.default_rng(0)
-    identification = Refined(IdentificationSettings(stroke_m=STROKE, pressure_pa=4e5))
-    identification.restart()
     errors = []
     for move in range(MOVES):
         grown = 1 + 0.3 * move / (MOVES - 1)
@@ -44,11 +38,8 @@ def test_friction_that_drifts_by_30_percent_in_10_minutes_is_followed_within_3_p
 
 
 def test_a_first_move_alone_tells_nothing_that_may_be_used() -> None:
-    valve = Valve.from_file(load_valve(shipped_valve("seed")))
-    valve.rest_at(0.05)
+    valve, identification = rested()
     pressure_pa, rng = valve.pressure_pa, np.random.default_rng(0)
-    identification = Refined(IdentificationSettings(stroke_m=STROKE, pressure_pa=4e5))
-    identification.restart()
     for row in range(250):
         if row == 100:
             pressure_pa += 5e4

@@ -113,11 +113,11 @@ def problem(
     require_units(record, valve)
     told = told_moves(record)
     by = by or sampling(record, valve)
-    in_a_loop = record.by_setpoint and not from_pressure
-    if not (in_a_loop and all(each.never_rests for each in told) and told):  # a loop shows what holds it all along
-        _require_motion(record, told, NO_LANDING if by.slow else NO_REST)
     load_n = max(WEIGHTS.break_away * valve.spring_n_per_m * record.scale_m, WEIGHTS.load * valve.coulomb_n)
-    return Problem(record, told, by, from_pressure, load_n)
+    found = Problem(record, told, by, from_pressure, load_n)
+    if not (found.by_setpoint and told and all(each.never_rests for each in told)):  # a loop shows what holds it
+        _require_motion(record, told, NO_LANDING if by.slow else NO_REST)
+    return found
 
 
 def _require_motion(record: Record, told: Sequence[ToldMove], no_rest: str) -> None:

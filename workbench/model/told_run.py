@@ -111,17 +111,18 @@ class ToldRun:
         time_s = record.time_s
         self._first_onsets_s = np.array([0.5 * (time_s[each.before] + time_s[each.before + 1]) for each in told])
         self._first_onsets_s.setflags(write=False)
-        self._fed = {each.segment.first: self._fed_m(each.segment) for each in self._parts}
+        self._fed = {each.segment.first: self._fed_m(each) for each in self._parts}
 
-    def _fed_m(self, segment: Segment) -> Vector:
+    def _fed_m(self, part: "_Part") -> Vector:
         """Return what a positioner is fed: the measured stem, m, (periods + 1,); NaN, the simulated, without a rest.
 
         Where the stem rests, so does its pressure; where it never does, a pressure that is told the stem drifts.
         """
-        rows = np.arange(segment.first, segment.end)
-        rests = not any(each.never_rests and segment.first <= each.before < segment.end for each in self.moves)
+        segment = part.segment
+        rests = not any(each.never_rests for each in self.moves[part.first : part.end])
         if not (self._composition.by_setpoint and rests):
             return np.full(segment.periods_s.size + 1, np.nan)
+        rows = np.arange(segment.first, segment.end)
         known = self.record.valid[rows]
         seen_m = np.interp(rows, rows[known], self.record.position_m[rows][known])
         return np.interp(np.arange(segment.periods_s.size + 1) / segment.parts, np.arange(rows.size), seen_m)

@@ -130,8 +130,6 @@ class EffectSearch:
         """Search from a fitted valve."""
         beam = [_Round(base, ())]
         for number in range(1, MOST_ADDED + 1):
-            if number == 2:
-                self._changes = self._changes_of(beam[0])
             for each in beam:
                 self._try_all(number, each)
             found = [model for each in beam for model, _ in self._extended(each)]
@@ -179,16 +177,17 @@ class EffectSearch:
         there = {name for each in here.added for name in algebraic_class(each, self._library)}
         return {name: each for name, each in self._library.items() if name not in there}
 
-    def _changes_of(self, here: _Round) -> Changes:
-        """Return what each effect that is tried at once changes of a model."""
-        first = {name: each for name, each in self._beside(here).items() if each.after not in self._library}
-        return changes(Left(here.before.fit, self._problem), first, self._workers)
-
     def _screen(self, here: _Round, names: Sequence[str]) -> list[str]:
-        """Return the effects whose tangents promise most beside a model, first of them what the best one has."""
+        """Return the effects whose tangents promise most beside a model, first of them what the best one has.
+
+        The best one is asked about first: by its tangents they are ranked beside all others, too.
+        """
+        left = Left(here.before.fit, self._problem)
+        if not self._changes:
+            self._changes = changes(left, {name: self._library[name] for name in names}, self._workers)
         shown = {name: self._changes[name] for name in names if name in self._changes}
         best_one_has = [name for name in names if name not in shown]
-        by_tangents = [each.name for each in rank(Left(here.before.fit, self._problem), shown)]
+        by_tangents = [each.name for each in rank(left, shown)]
         return [*best_one_has, *by_tangents][:SCREENED]
 
     def _try_all(self, number: int, here: _Round) -> None:

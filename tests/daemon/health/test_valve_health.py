@@ -29,13 +29,14 @@ from positioner.estimation.acceptance import Applied, Ratios
 from positioner.virtual.virtual_cycle import virtual_cycle
 from sim.slave.slave import device_of
 from tests.cases import few_always
+from tests.daemon.panel import ByName
 
 STROKE_M = 0.1016
 LAW = {"b_over_c_pa_per_m": -814e3, "k_over_c_pa": -22e3}
 NOISE_M = 1e-5
 
 
-class Panel:
+class Panel(ByName):
     """A daemon on a virtual valve, and its registers by name."""
 
     def __init__(
@@ -52,14 +53,6 @@ class Panel:
         self.registers = SupervisoryRegisters(self.cycle, Travel(STROKE_M), 0.0, 420e3, alarms=self.alarms)
         assert self.cycle.health is not None
         self.health = self.cycle.health
-
-    def get(self, name: str) -> float:
-        register = BY_NAME[name]
-        return register.format.decode(self.registers.read("holding", register.address, register.format.words))
-
-    def set(self, name: str, value: float) -> None:
-        register = BY_NAME[name]
-        self.registers.write(register.address, register.format.encode(value), "test")
 
     def set_all(self, values: Mapping[str, float]) -> None:
         words = [word for name, value in values.items() for word in BY_NAME[name].format.encode(value)]
