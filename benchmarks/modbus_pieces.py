@@ -18,8 +18,8 @@ from pymodbus.pdu.register_message import (
 
 from config.register_format import Format
 from fieldbus.modbus.connection import HEADER
-from fieldbus.modbus.register_answers import decoded
 from fieldbus.modbus.register_packing import Layout
+from fieldbus.modbus.register_requests import decoded
 
 ROUNDS, CALLS = 300, 50
 CYCLE_WORDS, MOST_WORDS = 11, 125

@@ -2,7 +2,7 @@
 
 Its files:
 
-    server, connection, register_answers    answers on TCP: the server, one client's frames, what a request gets
+    server, connection, register_requests   answers on TCP: the server, one client's frames, what a request gets
     admission, request_counts               who gets a place, and how often each host may ask; how often who asked
     client, client_errors                   asks on TCP; why there is no reply
     framing, host_address                   how frames lie in its stream; where its server is

@@ -1,7 +1,7 @@
 """A Modbus TCP server of 16-bit registers, for both towers: the simulated slave and the supervisory registers.
 
 Each client has a thread, so that a slow or dropped one holds up nobody (`fieldbus.modbus.connection` has the frames);
-what a request means, `fieldbus.modbus.register_answers` says. A client may read any part of a value; only both words
+what a request means, `fieldbus.modbus.register_requests` says. A client may read any part of a value; only both words
 from one request belong together.
 
 On TCP the address of the device is its IP address: unit 0 and 255 mean "this device", as does its own number.
@@ -30,7 +30,7 @@ from fieldbus.modbus.admission import Admitted, Allowance, Places, ServerLimits
 from fieldbus.modbus.client_roles import NOBODY, Identity, NotAuthorized
 from fieldbus.modbus.connection import Connection, endpoint
 from fieldbus.modbus.exception_codes import exception_reply
-from fieldbus.modbus.register_answers import RegisterAnswers, Registers
+from fieldbus.modbus.register_requests import RegisterAnswers, Registers
 from fieldbus.modbus.request_counts import RequestCounts
 from fieldbus.modbus.tls import Guard, failure_reason
 

@@ -23,7 +23,7 @@ from fieldbus.modbus.client import ModbusClient
 from fieldbus.modbus.client_errors import ClientError
 from fieldbus.modbus.client_roles import Identity, NotAuthorized, authorize
 from fieldbus.modbus.connection import HEADER, Connection
-from fieldbus.modbus.register_answers import RegisterAnswers
+from fieldbus.modbus.register_requests import RegisterAnswers
 from fieldbus.modbus.rtu import framed, is_whole
 from sim.slave.canopen_node import CanopenNode
 from sim.slave.clocks import Lockstep

@@ -14,7 +14,7 @@ from workbench.data.noise_floor import with_noise
 from workbench.data.record import Record, ready
 from workbench.model.command_between_samples import part_of_the_way
 from workbench.model.free_run import FreeRun
-from workbench.model.sampling import Motion, sampling
+from workbench.model.simulation_regime import Motion, sampling
 from workbench.select.effect_search import EffectSearch
 
 CALM = SEED.model_copy(update={"valve": SEED.valve.model_copy(update={"coulomb_n": 300.0, "static_n": 400.0})})

@@ -16,9 +16,9 @@ from workbench.compare.comparison import Comparison, compare
 from workbench.compare.slip_matching import SlipEvents
 from workbench.fit.fitting import fit
 from workbench.report.comparison_report import report_comparison
+from workbench.report.display_units import Reading
 from workbench.report.overlay import overlay
 from workbench.report.report_html import Subject
-from workbench.report.units import Reading
 
 NOISE_RAD = 5e-4
 DRIVE = """[drive]

@@ -21,7 +21,7 @@ from workbench.fit.fitting import Trial
 from workbench.fit.likelihood import Likelihood
 from workbench.fit.minimiser import End
 from workbench.fit.problem import Problem
-from workbench.model.sampling import DYNAMIC
+from workbench.model.simulation_regime import DYNAMIC
 from workbench.select import effect_search
 from workbench.select.effect_candidates import EffectStep, EvaluatedModel, judged_step
 from workbench.select.effect_search import FEWEST_GONE_ON, EffectSearch

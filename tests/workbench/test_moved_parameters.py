@@ -8,7 +8,7 @@ from config.valve_file import EffectTable, ValveFile
 from tests.workbench.hand_made import LIBRARY, fit_of
 from tests.workbench.valves import SEED, drawn_valve, record_of, with_effect
 from workbench.data.held_out import split
-from workbench.diagnosis.as_given import AsGiven
+from workbench.diagnosis.error_before_fit import AsGiven
 from workbench.diagnosis.moved_parameters import Moved, moved_parameters
 from workbench.fit.fitted_parameter import Fitted
 from workbench.fit.fitting import fit

@@ -19,7 +19,7 @@ from workbench.diagnosis.positioner_or_packing import ROUGH, PositionerOrPacking
 from workbench.fit.fitting import fit
 from workbench.imports.column_mapping import read_mapping
 from workbench.model.free_run import Accuracy, FreeRun
-from workbench.model.sampling import DYNAMIC
+from workbench.model.simulation_regime import DYNAMIC
 from workbench.report import Subject, report_comparison
 from workbench.select.effect_acceptance import Gain
 from workbench.select.effect_search import evaluated

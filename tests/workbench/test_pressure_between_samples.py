@@ -13,7 +13,7 @@ from workbench.data.pressure_lag import without_gaps_pa
 from workbench.data.record import ready
 from workbench.model.free_run import FreeRun
 from workbench.model.pressure_between_samples import means_between_samples_pa
-from workbench.model.sampling import Motion
+from workbench.model.simulation_regime import Motion
 
 SEED = valve("seed")
 PERIOD_S, FINE = 0.01, 200

@@ -16,7 +16,7 @@ from positioner.cli.parts.next_step import not_written
 from tests.workbench.test_pressure_errors import BARE, COMMAND_PA, recorded
 from workbench.data.held_out import split
 from workbench.data.record import Record, ready
-from workbench.diagnosis.by_command import ByCommand, by_command
+from workbench.diagnosis.command_or_pressure import ByCommand, by_command
 from workbench.diagnosis.diagnosis import diagnose
 from workbench.diagnosis.diagnosis_json import as_json
 from workbench.diagnosis.extension import extend

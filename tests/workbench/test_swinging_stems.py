@@ -12,7 +12,7 @@ from tests.workbench.valves import NOISE_M, SEED
 from workbench.compare.comparison import compare
 from workbench.data.record import ready
 from workbench.fit.fitting import fit
-from workbench.model.sampling import Motion, sampling, swing_m
+from workbench.model.simulation_regime import Motion, sampling, swing_m
 
 SWINGING = ValveFile(
     valve=SEED.valve.model_copy(

@@ -9,16 +9,16 @@ from config.recording import Column, Recording
 from tests.workbench.hand_made import AT_FLOOR, FLOOR_M, LIBRARY, errors_of, model_of
 from tests.workbench.valves import SEED
 from workbench.data.held_out import Split, split
-from workbench.diagnosis.as_given import AsGiven
 from workbench.diagnosis.diagnosis import Diagnosis
 from workbench.diagnosis.diagnosis_json import as_json
+from workbench.diagnosis.error_before_fit import AsGiven
 from workbench.diagnosis.extension import extension_of
 from workbench.diagnosis.judged_landings import JudgedLandings
 from workbench.diagnosis.verdict import verdict
 from workbench.diagnosis.verdict_sentence import BREAKS_ELSEWHERE, REPEAT, rivals_sentence, verdict_sentence
 from workbench.fit.fit_result import Term
 from workbench.fit.fitted_parameter import Fitted
-from workbench.model.sampling import Motion, Sampling
+from workbench.model.simulation_regime import Motion, Sampling
 from workbench.select.effect_candidates import EffectStep, EvaluatedModel, judged_step
 
 POOR = model_of(cost=20.0 * AT_FLOOR, error_m=20.0 * FLOOR_M)

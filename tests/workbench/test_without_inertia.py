@@ -14,7 +14,7 @@ from workbench.data.record import ready
 from workbench.data.stillness import eventful
 from workbench.fit.fitting import fit
 from workbench.model.free_run import FreeRun
-from workbench.model.sampling import DYNAMIC, Motion, landings, sampling
+from workbench.model.simulation_regime import DYNAMIC, Motion, landings, sampling
 
 ASYMMETRIC = with_effect(SEED, "asymmetric_friction", asymmetry=0.15)
 

@@ -5,13 +5,13 @@ Its files:
     diagnosis, diagnosis_json                     puts it together; the same as JSON
     verdict, verdict_sentence                     what follows, and how it is said
     judged_landings                               how many landings a verdict rests on, where nothing else is judged
-    as_given                                      what the file leaves before anything is fitted
+    error_before_fit                              what the file leaves before anything is fitted
     moved_parameters                              what the file's own effects are by the recording
-    kept_mass                                     what another mass than the valve file's would leave
+    assumed_mass                                  what another mass than the valve file's would leave
     measured_pressure                             what the stem is from the measured pressure on
-    by_command                                    whether the measured pressure is what drives the stem
+    command_or_pressure                           whether the measured pressure is what drives the stem
     pressure_scale                                whether the measured pressure is on the command's scale
-    stand_in                                      whether a form without a name does better than what was named
+    imitating_effect                              whether a form without a name does better than what was named
     positioner_or_packing                         what holds a stem behind its positioner
     extension, extension_json                     adds what was found; the same as JSON
     extension_journal                             what was added when, and why

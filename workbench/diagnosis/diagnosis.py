@@ -19,21 +19,21 @@ from sim.effect import Effect, find_effect, find_effects, tried_effects
 from workbench.compare.comparison_sentences import shorten_notes
 from workbench.data.held_out import Split, split
 from workbench.data.noise_floor import UNKNOWN, say_m
-from workbench.diagnosis.as_given import AsGiven
-from workbench.diagnosis.by_command import ByCommand, by_command
+from workbench.diagnosis.assumed_mass import KeptMass, kept_mass
+from workbench.diagnosis.command_or_pressure import ByCommand, by_command
+from workbench.diagnosis.error_before_fit import AsGiven
+from workbench.diagnosis.imitating_effect import StandIn, stand_in
 from workbench.diagnosis.judged_landings import judged_landings
-from workbench.diagnosis.kept_mass import KeptMass, kept_mass
 from workbench.diagnosis.measured_pressure import ByMeasuredPressure, by_measured_pressure
 from workbench.diagnosis.moved_parameters import Moved, moved_parameters
 from workbench.diagnosis.positioner_or_packing import PositionerOrPacking, positioner_or_packing
 from workbench.diagnosis.pressure_scale import PressureScale, pressure_scale
-from workbench.diagnosis.stand_in import StandIn, stand_in
 from workbench.diagnosis.verdict import EXPLAINED, Verdict, by_another_name, verdict
 from workbench.diagnosis.verdict_sentence import floor_by_pressure, verdict_line, verdict_sentence
 from workbench.fit.breaking_off import BrokenOff, ending
 from workbench.fit.fit_result import Fit
 from workbench.fit.threads import linear_algebra_alone
-from workbench.model.sampling import sampling
+from workbench.model.simulation_regime import sampling
 from workbench.select.candidate_table import candidate_columns, candidate_table, draw_race, lengths
 from workbench.select.effect_candidates import EffectCandidate, EffectStep, EvaluatedModel
 from workbench.select.effect_search import EffectSearch, Progress, Race

@@ -17,8 +17,8 @@ from config.results.result import Result
 from config.valve_file import ValveFile
 from sim.effect import find_effect, find_effects
 from workbench.data.held_out import Split, residual_m, split
-from workbench.diagnosis.as_given import AsGiven
 from workbench.diagnosis.diagnosis import Diagnosis
+from workbench.diagnosis.error_before_fit import AsGiven
 from workbench.diagnosis.pressure_scale import pressure_scale
 from workbench.fit.fit_result import Fit
 from workbench.fit.fitted_parameter import parameter_table

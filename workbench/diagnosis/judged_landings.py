@@ -14,7 +14,7 @@ from dataclasses import dataclass
 
 from workbench.data.held_out import Part, Split
 from workbench.fit.fit_result import Fit
-from workbench.model.sampling import MORE_LANDINGS, Sampling, landings
+from workbench.model.simulation_regime import MORE_LANDINGS, Sampling, landings
 
 A_PARAMETER_FITTED, A_PARAMETER_HELD_OUT = 2, 1
 """Landings that each parameter takes; more are needed."""

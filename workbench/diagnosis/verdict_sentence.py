@@ -8,7 +8,7 @@ from sim.composition import BASE, COULOMB, STATIC
 from sim.effect import Effect
 from workbench.data.held_out import Split
 from workbench.data.noise_floor import UNKNOWN
-from workbench.diagnosis.as_given import AsGiven
+from workbench.diagnosis.error_before_fit import AsGiven
 from workbench.diagnosis.judged_landings import unknown_between_samples
 from workbench.diagnosis.verdict import EXPLAINED, Verdict, by_another_name
 from workbench.fit.fit_result import Fit

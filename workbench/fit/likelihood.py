@@ -31,7 +31,7 @@ from sim.composition import COULOMB, STATIC, Composition
 from sim.karnopp import Vector
 from workbench.data.record import Record
 from workbench.model.parameters import Parameter
-from workbench.model.sampling import Sampling
+from workbench.model.simulation_regime import Sampling
 from workbench.model.told_run import RECORDS, ToldMove, ToldPath, ToldRun
 
 Rows = npt.NDArray[np.int64]

@@ -10,7 +10,7 @@ from sim.effect import Effect
 from workbench.data.record import Record, require_units
 from workbench.fit.likelihood import WEIGHTS, Likelihood
 from workbench.model.parameters import AT_REST, BEHIND_POSITIONER, DEFAULT, LANDED, Parameter, free_parameters
-from workbench.model.sampling import NO_LANDING, Motion, Sampling, sampling
+from workbench.model.simulation_regime import NO_LANDING, Motion, Sampling, sampling
 from workbench.model.told_run import ToldMove, told_moves
 
 LEAST_MOVES = 2

@@ -14,7 +14,7 @@ from workbench.fleet.examination import Examination
 from workbench.fleet.fleet import Fleet, since_day
 from workbench.fleet.valve_complaints import ValveCourse
 from workbench.report import report_html as page
-from workbench.report.units import OF_VALVE, Shown
+from workbench.report.display_units import OF_VALVE, Shown
 
 WIDTH_PX, HEIGHT_PX, RADIUS_PX = 120, 24, 2
 LEAST_RATIO, MOST_RATIO = 1.0, 100.0

@@ -18,8 +18,8 @@ from workbench.loops.oscillation import without_trend
 from workbench.loops.plant import Plant
 from workbench.report import report_html as page
 from workbench.report.charts import EXTENDED, MEASURED, MODEL, QUIET, Figure, axis, layout, line
+from workbench.report.display_units import Shown
 from workbench.report.plot_series import draw_series, significant
-from workbench.report.units import Shown
 
 KIND = {"sticks": "bad", "something else": "good", "cannot be told": "open"}
 DRAWN = 3000

@@ -7,7 +7,7 @@ Its files:
     slow_segments             a record as it is simulated without inertia
     initial_state             where a segment begins, and the pressure that nobody told
     lead                      what was commanded before a segment, for a pressure path that remembers
-    sampling                  with inertia, without, or landing by landing: by how far apart the samples are
+    simulation_regime         with inertia, without, or landing by landing: by how far apart the samples are
     command_between_samples   whether the command changed between them, by where slides end
     pressure_between_samples  what the measured pressure is between them
     parameters                the coordinates of a fit

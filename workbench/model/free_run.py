@@ -16,7 +16,7 @@ Behind a positioner no command is a pressure: it begins at rest, with what the r
 Simulated from measured pressure, the pressure path's effects are left out, and what the pressure is between its samples
 `pressure_between_samples` says. A measured load acts as the pressure load / A besides.
 
-Where samples lie farther apart than slides last (`sampling`), the stem has no inertia (`slow_segments`).
+Where samples lie farther apart than slides last (`simulation_regime`), the stem has no inertia (`slow_segments`).
 """
 
 from collections.abc import Iterator
@@ -52,7 +52,7 @@ from workbench.model.initial_state import (
 )
 from workbench.model.lead import Lead, lead_of
 from workbench.model.pressure_between_samples import means_between_samples_pa
-from workbench.model.sampling import NO_LANDING, Sampling, sampling
+from workbench.model.simulation_regime import NO_LANDING, Sampling, sampling
 from workbench.model.slow_segments import SlowSegment, slow_segments, told_nothing
 
 

@@ -1,4 +1,4 @@
-"""A record as it is simulated without inertia, where samples lie farther apart than slides last (`sampling`).
+"""A record as it is simulated without inertia, where samples lie farther apart than slides last (`simulation_regime`).
 
 A measured pressure goes in straight lines from part to part of a period, as `pressure_between_samples` has it; where
 each rest is judged by itself it is the one at the period's end. Rows in which nothing happens are passed over
@@ -27,7 +27,7 @@ from workbench.data.stillness import eventful
 from workbench.model.initial_state import BeforeStart, InitialState, before_start, initial_state
 from workbench.model.lead import Lead
 from workbench.model.pressure_between_samples import ends_of_parts_pa
-from workbench.model.sampling import Motion, Sampling, landings
+from workbench.model.simulation_regime import Motion, Sampling, landings
 
 CASCADE = 16
 """Steps to a sample where effects of the pressure path with a memory follow each other."""

@@ -20,7 +20,7 @@ from sim.composition import Composition
 from sim.karnopp import Vector
 from workbench.data.record import Record
 from workbench.model.free_run import FreeRun, Segment
-from workbench.model.sampling import DYNAMIC, Sampling
+from workbench.model.simulation_regime import DYNAMIC, Sampling
 
 Rows = npt.NDArray[np.int64]
 RECORDS = 64

@@ -51,7 +51,7 @@ from workbench.page.provenance import (
 )
 from workbench.page.recording_opening import Export, Opened
 from workbench.page.search import Search
-from workbench.report.units import Quantity, Shown
+from workbench.report.display_units import Quantity, Shown
 
 SAVED = "saved"
 """The line of a variant that a person keeps."""

@@ -11,7 +11,7 @@ from workbench.compare.comparison import Comparison
 from workbench.compare.comparison_sentences import Stretch, slip_sentences
 from workbench.page.explained_words import word
 from workbench.report.comparison_report import headline
-from workbench.report.units import of_stroke
+from workbench.report.display_units import of_stroke
 
 Look = Callable[[Stretch | None], None]
 """Goes to a stretch; None: to the whole recording."""

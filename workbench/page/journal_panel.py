@@ -15,9 +15,9 @@ from workbench.page.desk import Desk
 from workbench.page.notebook import notebook
 from workbench.page.provenance import refitting
 from workbench.report import Subject, report_comparison, report_diagnosis
+from workbench.report.display_units import Reading
 from workbench.report.effect_ranking import error_reduction
 from workbench.report.journal_report import journal_sections
-from workbench.report.units import Reading
 
 FALL_PX = 320
 

@@ -14,7 +14,7 @@ from workbench.fit.fitted_parameter import Fitted
 from workbench.model.parameters import Parameter
 from workbench.page.explained_words import about_effect, explain_text
 from workbench.page.live_model import LiveModel
-from workbench.report.units import parameter as in_words
+from workbench.report.display_units import parameter as in_words
 
 SLIDER_STEP = 0.0005
 """Of the way of a slider: of a range of a factor 2500 a step is 0.4 %."""

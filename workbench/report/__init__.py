@@ -12,7 +12,7 @@ The same input, the same bytes. Its files:
     effects_table, effect_ranking          sections that two of them share; which effect lowers the error how far
     overlay, signature_loop                measured and simulated, over time and over the command
     charts, plot_series                    the small plots; what is too long thinned out
-    report_html, units                     pieces of HTML set into one page; units that people at a plant use
+    report_html, display_units             pieces of HTML set into one page; units that people at a plant use
 """
 
 from workbench.report.comparison_report import report_comparison

@@ -7,8 +7,8 @@ import numpy as np
 
 from webpage.plot_colours import LIGHT
 from workbench.compare.residuals import Correlation, Profile, Spectrum
+from workbench.report.display_units import Reading
 from workbench.report.plot_series import significant
-from workbench.report.units import Reading
 
 Figure = dict[str, Any]
 Trace = dict[str, Any]

@@ -11,10 +11,10 @@ from workbench.compare.comparison_sentences import shorten_notes
 from workbench.compare.measures import fit_in_words
 from workbench.report import report_html as page
 from workbench.report.charts import MEASURED, MODEL, Figure, correlation, profiles, spectrum
+from workbench.report.display_units import Reading, Shown, of_stroke, times
 from workbench.report.overlay import Simulated, overlay, phase_shades
 from workbench.report.plot_series import MOST_SERIES_POINTS, stretch
 from workbench.report.signature_loop import signature
-from workbench.report.units import Reading, Shown, of_stroke, times
 
 MEANINGS = {
     "stuck": "the stem rests",

@@ -12,16 +12,16 @@ from workbench.compare.comparison import Comparison, compare
 from workbench.data.held_out import Split
 from workbench.diagnosis.diagnosis import Diagnosis
 from workbench.fit.fitted_parameter import Fitted
-from workbench.model.sampling import MORE_LANDINGS
+from workbench.model.simulation_regime import MORE_LANDINGS
 from workbench.report import effect_ranking
 from workbench.report import report_html as page
 from workbench.report.charts import EXTENDED, MODEL, QUIET, axis, layout, line
 from workbench.report.comparison_report import MEANINGS, WORDS, facts, overlaid, recording
+from workbench.report.display_units import Reading, Shown, of_stroke, times
 from workbench.report.effects_table import RankedStep, headline, not_told_apart, ranks, show_added, show_tried
 from workbench.report.overlay import HELD_OUT, Mask, Shade, Simulated, overlay
 from workbench.report.plot_series import draw_series, round_values
 from workbench.report.signature_loop import signature
-from workbench.report.units import Reading, Shown, of_stroke, times
 from workbench.select.effect_acceptance import LEAST_BIC, LEAST_HELD_OUT
 from workbench.select.effect_candidates import EffectCandidate, EvaluatedModel
 from workbench.select.equivalence import undetectable

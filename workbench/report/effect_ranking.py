@@ -7,8 +7,8 @@ import numpy as np
 
 from config.results.drawing import decade_ticks
 from workbench.report.charts import EXTENDED, INK, MEASURED, OPEN, QUIET, Figure, axis, layout, mark_line
+from workbench.report.display_units import Quantity
 from workbench.report.plot_series import significant
-from workbench.report.units import Quantity
 from workbench.select.candidate_table import Tried
 
 OUTCOMES = {

@@ -5,9 +5,9 @@ from dataclasses import dataclass
 
 from sim.effect import Effect, find_effect
 from workbench.report import effect_ranking
+from workbench.report.display_units import Quantity
 from workbench.report.effect_ranking import RankedEffect
 from workbench.report.report_html import Html, Row, keep_lines, plot, section, subheading, table, text
-from workbench.report.units import Quantity
 from workbench.select.effect_acceptance import LEAST_BIC, LEAST_HELD_OUT
 from workbench.select.equivalence import classes, distinguishing_record
 from workbench.select.forward_selection import Candidate, CandidateT, FittedT, ForwardStep

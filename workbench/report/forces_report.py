@@ -15,9 +15,9 @@ from workbench.report import report_html as page
 from workbench.report.charts import EXTENDED, MEASURED, MODEL, QUIET, Figure, axis, layout, line, profiles
 from workbench.report.comparison_report import WORDS
 from workbench.report.diagnosis_report import DIAGNOSIS_WORDS
+from workbench.report.display_units import FORCE, Shown, force, parameter, times
 from workbench.report.effects_table import RankedStep, headline, not_told_apart, ranks, show_added, show_tried
 from workbench.report.plot_series import round_values
-from workbench.report.units import FORCE, Shown, force, parameter, times
 
 DRAWN_ROWS = 6_000
 """Rows drawn at most."""

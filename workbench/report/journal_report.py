@@ -7,7 +7,7 @@ from config.drive import Kind
 from workbench.diagnosis.extension_journal import ExtensionStep, Journal
 from workbench.report import effect_ranking
 from workbench.report import report_html as page
-from workbench.report.units import Reading, Shown, times
+from workbench.report.display_units import Reading, Shown, times
 
 WORDS = {
     "As given": "The valve file as it was before the step, nothing fitted.",

@@ -15,8 +15,8 @@ from config.recording import Column
 from workbench.compare.phases import PHASES, STUCK
 from workbench.compare.slip_matching import SlipEvents
 from workbench.report.charts import MEASURED, QUIET, Figure, Trace, line, over_time
+from workbench.report.display_units import OF_VALVE, Reading
 from workbench.report.plot_series import draw_series, round_values, running_s
-from workbench.report.units import OF_VALVE, Reading
 
 SHADES = {
     "slipping up": "rgba(60,130,200,0.13)",

@@ -15,7 +15,7 @@ from typing import Any, NewType
 from config.errors import InputError, explain_failure
 from config.valve_file import ValveFile
 from config.whole_file import beside
-from workbench.report.units import Shown
+from workbench.report.display_units import Shown
 
 HERE = Path(__file__).parent
 Html = NewType("Html", str)

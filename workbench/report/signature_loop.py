@@ -8,10 +8,10 @@ from collections.abc import Sequence
 
 from config.recording import Column
 from workbench.report.charts import MEASURED, Figure, Trace, axis, layout, line
+from workbench.report.display_units import Reading
 from workbench.report.overlay import Simulated
 from workbench.report.plot_series import extremes, round_values
 from workbench.report.report_html import Html, plot, section
-from workbench.report.units import Reading
 
 MOST_LOOP_POINTS = 6000
 """Points drawn of one loop at most."""

@@ -30,7 +30,7 @@ from workbench.fit.likelihood import Groups, Likelihood
 from workbench.fit.minimiser import descend
 from workbench.fit.onsets import with_onsets
 from workbench.fit.uncertainty import FARTHEST
-from workbench.model.sampling import NO_LANDING
+from workbench.model.simulation_regime import NO_LANDING
 from workbench.select.residual_structure import structure
 
 AT_FLOOR, RARELY_OFF = 1.6, 1.75

@@ -5,7 +5,7 @@ from typing import Any
 import pytest
 
 from workbench.blind.hiding import hide
-from workbench.diagnosis import stand_in
+from workbench.diagnosis import imitating_effect
 from workbench.diagnosis.diagnosis import diagnose
 from workbench.diagnosis.diagnosis_json import as_json
 from workbench.discover import form_search
@@ -30,7 +30,7 @@ def test_two_effects_that_imitate_a_flow_force_which_was_not_tried_are_no_explan
         asked.append(form_search.search_forms(*args, **settings))
         return asked[-1]
 
-    monkeypatch.setattr(stand_in, "search_forms", searched)
+    monkeypatch.setattr(imitating_effect, "search_forms", searched)
     monkeypatch.setattr(form_search, "FORMS", tuple(each for each in FORMS if each.name in FEW))
     found = diagnose(hidden.fit, hidden.base, effects=NAMED)
     assert found.best.explained, "it reaches the floor: by what is left alone it would be called all that is missing"

@@ -21,7 +21,7 @@ from config.results.result import Brief
 from config.valve_file import ValveFile
 from sim.effect import Effect
 from workbench.data.held_out import Split
-from workbench.diagnosis.kept_mass import leaves_something
+from workbench.diagnosis.assumed_mass import leaves_something
 from workbench.discover.form_search import FIRST_TURN_FORMS, search_forms
 from workbench.select.block_errors import AT_FLOOR, NOISE_KNOWN_TO
 from workbench.select.effect_candidates import EffectStep, EvaluatedModel, outdoes

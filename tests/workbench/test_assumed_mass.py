@@ -6,8 +6,8 @@ import pytest
 from tests.workbench.hand_made import AT_FLOOR, FLOOR_M, model_of
 from tests.workbench.valves import drawn_valve, record_of
 from workbench.blind.input_signal import excitation
+from workbench.diagnosis.assumed_mass import explains_most, leaves_something
 from workbench.diagnosis.diagnosis import diagnose
-from workbench.diagnosis.kept_mass import explains_most, leaves_something
 
 LIGHT_KG = 1.4
 
