@@ -74,19 +74,20 @@ def state_by_mode(decision: Decision) -> ServiceState:
 
 
 def table() -> list[str]:
-    """Return the transitions as rows of a table: a row a state, a column an event."""
-    events = list(ServiceEvent)
-    head = ["", *(f"{event}" for event in events)]
-    rows = [
-        [state.name.lower().replace("_", "-"), *(_cell(state, event) for event in events)] for state in ServiceState
-    ]
-    return [_row(head), _row(["---"] * len(head)), *(_row(each) for each in rows)]
+    """Return the transitions as rows of a table: what happens, the states that it changes, and what they become."""
+    befores: dict[tuple[ServiceEvent, ServiceState], list[str]] = {}
+    for state, changes in TRANSITIONS.items():
+        for event, after in changes.items():
+            if after is not state:
+                befores.setdefault((event, after), []).append(_word(state))
+    rows = [(event, ", ".join(befores[event, after]), _word(after)) for event, after in sorted(befores, key=_place)]
+    head = (("what happens", "in state", "leads to"), ("---",) * 3)
+    return [f"| {' | '.join(row)} |" for row in (*head, *rows)]
 
 
-def _cell(state: ServiceState, event: ServiceEvent) -> str:
-    after = TRANSITIONS[state].get(event)
-    return "" if after in (None, state) else after.name.lower().replace("_", "-")
+def _place(change: tuple[ServiceEvent, ServiceState]) -> tuple[int, int]:
+    return list(ServiceEvent).index(change[0]), change[1]
 
 
-def _row(cells: list[str]) -> str:
-    return f"| {' | '.join(cells)} |"
+def _word(state: ServiceState) -> str:
+    return state.name.lower().replace("_", "-")
