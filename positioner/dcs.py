@@ -146,7 +146,7 @@ class Dcs:
             InputError, DcsError: as `set`.
         """
         self.set(name, value)
-        self._wait_for_a_cycle()
+        self.wait_for_a_cycle()
         return self.get(name)
 
     def identify(
@@ -165,13 +165,13 @@ class Dcs:
         applied_before = self.get("identifications")
         if self.get("eta_1") == 0 and self.get("state") != State.S3_IDENTIFY:
             self.set_all(SWITCHED_OFF)  # somebody left it so, and it would not count as asked for
-            self._wait_for_a_cycle()
+            self.wait_for_a_cycle()
         try:
             self.set_all({"eta_1": 0, "eta_2": 0, "eta_3": 0})
             problem = self._wait_for_estimates(timeout_s, show)
         finally:
             self.set_all(SWITCHED_OFF)
-        self._wait_for_a_cycle()
+        self.wait_for_a_cycle()
         if self.get("identifications") != applied_before:
             return None
         return problem or Refusal(int(self.get("refusal"))).text
@@ -232,7 +232,7 @@ class Dcs:
     def _played_within(self, timeout_s: float) -> ExperimentState | None:
         """Wait until no experiment commands; return what became of it, None if one still does after so long."""
         due_s = time.monotonic() + timeout_s
-        self._wait_for_a_cycle()
+        self.wait_for_a_cycle()
         while time.monotonic() < due_s:
             state = ExperimentState(int(self.get("experiment_state")))
             if state not in (ExperimentState.UNDER_WAY, ExperimentState.RETURNING):
@@ -240,7 +240,7 @@ class Dcs:
             time.sleep(POLL_S)
         return None
 
-    def _wait_for_a_cycle(self) -> None:
+    def wait_for_a_cycle(self) -> None:
         """Wait until the daemon has decided on what it was told, however slow its loop; not for one that stands."""
         asked, due_s = self.get("cycles"), time.monotonic() + CYCLE_WITHIN_S
         while not self.decided_since(asked) and time.monotonic() < due_s:

@@ -37,10 +37,10 @@ from positioner.tests_on_the_valve.program import Bounds, Leap, Program, ramped
 from positioner.tests_on_the_valve.ramps import Leg, Line, Ramps, difference, legs_of, ramps_of, scaled
 from positioner.tests_on_the_valve.thresholds import THRESHOLDS
 
-LEGS = 2.0 * (1.0 + 1.0 / THRESHOLDS.least_rate_ratio)
-"""Up and down, and at the fast rate from the command in force to the least one and back: as long as slow legs."""
-HOLDS = 4
-"""After each of them."""
+LEGS = 2.0 + 1.0 / THRESHOLDS.least_rate_ratio
+"""There and back, and at the fast rate from the command in force to the nearer end and back: as long as slow legs."""
+HOLDS = 3
+"""At that end, at the other, and there again."""
 DECILES = tuple(0.1 * each for each in range(1, 10))
 
 
@@ -60,8 +60,9 @@ class Nameplate:
 def programmes(bounds: Bounds, start_pa: float, source: str = "experiment") -> tuple[Program, ...]:
     """Return the slow ramps, twice, and the fast ones, each a program of its own, as slow as the time limit permits.
 
-    From the command in force to the least one, up, down, and back; the fast ones go up and down twice. The ways there
-    and back are fast, for they show nothing: the faster a force grows, the less of it breaks a stem loose.
+    From the command in force to the nearer end of the pressures, to the other, there again, and back; the fast ones go
+    there and back twice. The ways to them are fast, for they show nothing: the faster a force grows, the less of it
+    breaks a stem loose.
 
     Raises:
         InputError: the time limit leaves no time for slow ramps; names the source.
@@ -76,11 +77,13 @@ def programmes(bounds: Bounds, start_pa: float, source: str = "experiment") -> t
         )
     fast_s = min(slow_s / THRESHOLDS.least_rate_ratio, max(slow_s / THRESHOLDS.rate_ratio, THRESHOLDS.shortest_leg_s))
     fast_s = max(fast_s, span_pa / bounds.rate_pa_per_s)
-    first, last = Leap(bounds.minimum_pa, held_s), Leap(start_pa, held_s)
-    up_and_down = (Leap(bounds.maximum_pa, held_s), first)
-    slowly = tuple(replace(each, rate_pa_per_s=span_pa / slow_s) for each in up_and_down)
-    slow = ramped("slow ramps", start_pa, (first, *slowly, last), span_pa / fast_s)
-    return slow, slow, ramped("fast ramps", start_pa, (first, *2 * up_and_down, last), span_pa / fast_s)
+    near_pa, far_pa = sorted((bounds.minimum_pa, bounds.maximum_pa), key=lambda each: abs(each - start_pa))
+    near, back = Leap(near_pa, held_s), Leap(start_pa, 0.0)
+    there_and_back = (Leap(far_pa, held_s), near)
+    slowly = tuple(replace(each, rate_pa_per_s=span_pa / slow_s) for each in there_and_back)
+    slow = ramped("slow ramps", start_pa, (near, *slowly, back), span_pa / fast_s)
+    fast = ramped("fast ramps", start_pa, (near, *2 * there_and_back, back), span_pa / fast_s)
+    return slow, slow, fast
 
 
 def time_limit_s(leg_s: float) -> float:

@@ -96,7 +96,6 @@ def test_steps_and_continuous_stroke_are_played_one_at_a_time_and_power_that_is_
             assert "the mode is not automatic" in capsys.readouterr().err
             with site.dcs() as dcs:
                 dcs.set("mode", 2)
-                wait_until(site, "mode", 2)
                 assert main(["steps", *words]) == 1
                 assert "the DCS has not consented" in capsys.readouterr().err
                 dcs.set("experiment_consent", 1)

@@ -141,7 +141,7 @@ def test_what_cannot_be_told_is_said_in_a_code() -> None:
 
 
 def test_a_time_limit_that_is_too_short_is_refused() -> None:
-    with pytest.raises(InputError, match=r"site: experiment.limit_s: a signature needs 18 s"):
+    with pytest.raises(InputError, match=r"site: experiment.limit_s: a signature needs 15.3 s"):
         programmes(replace(BOUNDS, longest_s=15.0), 0.0, "site")
 
 
@@ -153,7 +153,7 @@ def test_most_of_the_time_is_the_slow_ramps_wherever_the_stem_is(start_pa: float
     at_s, levels_pa = np.array(slow.points).T
     ramps = np.abs(np.diff(levels_pa)) == MAXIMUM_PA
     assert slow.lasts_s <= short.longest_s
-    assert np.sort(np.diff(at_s)[ramps])[-2:].sum() > 0.65 * short.longest_s
+    assert np.sort(np.diff(at_s)[ramps])[-2:].sum() > 0.75 * short.longest_s
 
 
 def test_programmes_stay_within_the_bounds_and_end_where_they_began() -> None:

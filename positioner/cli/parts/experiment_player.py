@@ -48,6 +48,7 @@ def require_ready(file: "DaemonFile", arguments: argparse.Namespace) -> None:
     with daemon_of(arguments) as dcs:
         if not folder.is_dir():
             raise InputError(str(folder), "the recorder's folder is not there: run this on the daemon's machine")
+        dcs.wait_for_a_cycle()  # a mode that was written just before is decided on by the next
         if dcs.get("mode") != Mode.AUTOMATIC:
             raise CommandFailed(
                 "the mode is not automatic, so nothing may move the valve: positioner set mode automatic"
