@@ -8,7 +8,6 @@ from html.parser import HTMLParser
 from pathlib import Path
 
 import pytest
-from matplotlib.backends.backend_pdf import PdfPages
 from matplotlib.figure import Figure as Drawn
 
 from config.codes import ValveTestVerdict
@@ -110,6 +109,8 @@ def test_every_column_that_tables_of_plants_have_is_there_with_its_plus_minus(si
 def test_a_pdf_has_a_page_for_each_with_all_its_words_on_it(
     site: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
+    from matplotlib.backends.backend_pdf import PdfPages  # a second of every worker that only collects this file
+
     out, words = tmp_path / "FV-1.pdf", list[str]()
     drawn: Callable[..., None] = PdfPages.savefig
 

@@ -23,7 +23,7 @@ HEAD = "valve,file,recording,when\n"
 ROWS, PERIOD_S = 1000, 0.02
 TIGHTER = {"coulomb_n": 2200.0, "static_n": 2600.0}
 PLAY = {"name": "backlash", "width_m": 4e-3}
-FEW = ["asymmetric_friction", "backlash", "preload", "ip_lag"]
+FEW = ["asymmetric_friction", "backlash"]
 
 
 def record(file: ValveFile, path: Path, seed: int, *, share: float = 1.0, gain: float = 1.0) -> None:

@@ -112,7 +112,7 @@ def test_what_lands_alike_is_left_open() -> None:
 def test_slips_that_follow_each_other_faster_than_samples_are_fitted(effect: EffectTable | None, seed: int) -> None:
     """Sliding on at F_c where it stops, the stem is 0.15 to 0.33 mm off at the true parameters."""
     tables = () if effect is None else (effect,)
-    recording = slow_ramps(ValveFile(valve=TRULY, effect=tables), seed)
+    recording = slow_ramps(ValveFile(valve=TRULY, effect=tables), seed, count=260)
     found = fit(recording, KNOWN, effects=[each.name for each in tables])
     assert found.rms_m < 1.15 * NOISE_M
     assert found.parameters["coulomb_n"].value == pytest.approx(TRULY.coulomb_n, rel=0.02)

@@ -32,7 +32,7 @@ def matlab_columns(path: Path) -> Columns:
     return columns
 
 
-def _read(path: Path) -> Groups:
+def read_here(path: Path) -> Groups:
     """Read a file, here and now.
 
     Raises:
@@ -63,4 +63,4 @@ def _vectors(values: Mapping[str, Any], prefix: str = "") -> Iterator[tuple[str,
 
 
 if __name__ == "__main__":
-    write_read(_read, *sys.argv[1:])
+    write_read(read_here, *sys.argv[1:])

@@ -34,7 +34,7 @@ def mdf4_groups(path: Path) -> Groups:
     return read_apart(path, "workbench.imports.mdf4_reader", KIND)
 
 
-def _read(path: Path) -> Groups:
+def read_here(path: Path) -> Groups:
     """Read a file, here and now.
 
     Raises:
@@ -78,4 +78,4 @@ def _of_master(channel: Any) -> str:
 
 
 if __name__ == "__main__":
-    write_read(_read, *sys.argv[1:])
+    write_read(read_here, *sys.argv[1:])
