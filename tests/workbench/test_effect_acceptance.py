@@ -220,8 +220,8 @@ def test_a_missed_slip_is_not_structure_and_does_not_hide_it() -> None:
 
 
 def test_of_a_long_record_the_regressors_are_held_once() -> None:
-    record = ready(moving(60_000))
-    error = noise(60_000)
+    record = ready(moving(20_000))
+    error = noise(20_000)
     tracemalloc.start()
     structure(record, error)
     _, most = tracemalloc.get_traced_memory()
