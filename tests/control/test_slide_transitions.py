@@ -59,6 +59,22 @@ def test_a_move_ends_at_its_reference_within_its_slides_and_bounds_and_slides_te
     assert np.mean(later) <= 2.3
 
 
+def test_a_move_has_fourteen_slides_and_two_more_each_minute_however_far_off_they_land(
+    monkeypatch: pytest.MonkeyPatch,
+) -> None:
+    """Each slide lands farther off than the last, to the other side: in the end nothing but their number ends it."""
+    given, later = [], []
+    for stem in drawn_stems(COUNT):
+        misses_m = [5e-4 * (-1.3) ** n * STROKE_M for n in range(1000)]
+        monkeypatch.setattr(stem, "scattered_m", iter(misses_m).__next__)
+        for reference_m in references(stem, 6):
+            given.append(stem.moved_to(reference_m))
+            stem.now_s += 60.0
+            later.append(stem.moved_to(reference_m))
+    assert max(given) == 14
+    assert max(later) == 2
+
+
 def left_alone(stem: ScriptedStem, reference_m: float) -> set[float]:
     """Return the commands of a stem in the hours after its move: of a copy, for break-away is known less well then."""
     alone, commands_pa = deepcopy(stem), set()
