@@ -36,7 +36,7 @@ def run(arguments: argparse.Namespace) -> int:
 
     from workbench.bench.cases import CASES, read_cases, write_cases
     from workbench.bench.methods import answers_of
-    from workbench.bench.scores import Answer, read_results, tell_scores, write_results
+    from workbench.bench.scores import add_results, read_results, tell_scores
 
     for name in ("drawn", "effects", "first_seed"):
         if (value := getattr(arguments, name)) < 0:
@@ -44,17 +44,15 @@ def run(arguments: argparse.Namespace) -> int:
     folder = arguments.folder
     if not (folder / CASES).exists():
         write_cases(folder, arguments.drawn, arguments.effects, arguments.first_seed, arguments.labelled)
-    cases = read_cases(folder)
-    answers: list[Answer] = []
-    if (folder / RESULTS).exists():
-        answers = read_results(folder / RESULTS)
-    else:
-        with ProcessPoolExecutor(arguments.workers) as pool:
-            for count, found in enumerate(pool.map(answers_of, cases), start=1):
-                answers += found
-                print(f"\r{count} of {len(cases)} cases", end="", file=sys.stderr, flush=True)
-        print(file=sys.stderr)
-        write_results(folder / RESULTS, answers)
+    cases, results = read_cases(folder), folder / RESULTS
+    answers = read_results(results) if results.exists() else []
+    done = {(each.set, each.case) for each in answers}
+    left = [each for each in cases if (each.set, each.name) not in done]
+    with ProcessPoolExecutor(arguments.workers) as pool:
+        for count, found in enumerate(pool.map(answers_of, left), start=1):
+            add_results(results, found)
+            answers += found
+            print(f"\r{count} of {len(left)} cases", end="" if count < len(left) else "\n", file=sys.stderr, flush=True)
     for path in arguments.judge:
         answers += read_results(path)
     print(*tell_scores(cases, answers), sep="\n")

@@ -8,7 +8,7 @@ import pytest
 from config.errors import InputError
 from positioner.cli.main import main
 from workbench.bench.cases import read_cases, write_cases
-from workbench.bench.scores import Answer, area, area_interval, read_results, tell_scores, write_results
+from workbench.bench.scores import Answer, add_results, area, area_interval, read_results, tell_scores
 
 HEAD = "set,case,file,truth,stiction_pct\n"
 
@@ -26,13 +26,17 @@ def test_cases_go_into_a_folder_once_and_a_rivals_file_is_judged_beside_ours(
     folder = tmp_path / "cases"
     words = ["bench", str(folder), "--drawn", "2", "--first-seed", "10", "--workers", "1"]
     assert main(words) == 0
-    cases = read_cases(folder)
+    cases, results = read_cases(folder), folder / "results.csv"
+    whole = results.read_text().splitlines()
+    results.write_text("\n".join(whole[:6]) + "\n")  # stopped after the first case
+    assert main(words) == 0
+    assert results.read_text().splitlines() == whole
     assert {each.truth for each in cases} == {"0", "1"}
     rival = [
         Answer(c.set, c.name, "oracle", float(c.truth), "sticks" if c.truth == "1" else "", c.stiction_pct)
         for c in cases[1:]
     ]
-    write_results(tmp_path / "r.csv", rival)
+    add_results(tmp_path / "r.csv", rival)
     capsys.readouterr()
     assert main([*words, "--judge", str(tmp_path / "r.csv")]) == 0
     out = capsys.readouterr().out

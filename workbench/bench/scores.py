@@ -38,11 +38,12 @@ class Answer:
     stiction_pct: float | None
 
 
-def write_results(path: Path, answers: Sequence[Answer]) -> None:
-    """Write a results file."""
-    with path.open("w", encoding="utf-8", newline="") as file:
+def add_results(path: Path, answers: Sequence[Answer]) -> None:
+    """Add to a results file, or begin it."""
+    with path.open("a", encoding="utf-8", newline="") as file:
         writer = csv.writer(file)
-        writer.writerow([each.name for each in fields(Answer)])
+        if file.tell() == 0:
+            writer.writerow([each.name for each in fields(Answer)])
         writer.writerows(astuple(each) for each in answers)
 
 

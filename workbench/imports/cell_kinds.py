@@ -10,11 +10,16 @@ from workbench.imports.cell_units import with_any_unit
 from workbench.imports.number_notation import number
 from workbench.imports.raw_table import Cell
 
-_NUMBER_BEGINS = re.compile("[+\u2212-]?[.,]?\\d")
+_NUMBER_BEGINS = re.compile("(?!\\d+[-_]?[A-Za-z]{2,}[-_]?\\d{2,}\\w*[._/]\\w*[A-Za-z])[+\u2212-]?[.,]?\\d")
+"""But no tag that begins with the number of its unit, as 30FC1021.PV does."""
 
 
 def begins_number(cell: Cell) -> bool:
-    """Return whether a cell is, or begins as, a number or a date."""
+    """Return whether a cell is, or begins as, a number or a date.
+
+    >>> [begins_number(each) for each in ("30FC1021.PV", "05-Mar-26 08:15:00 PM", "12 ft3/min", "Bad")]
+    [False, True, True, False]
+    """
     return not isinstance(cell, str) or _NUMBER_BEGINS.match(cell) is not None
 
 

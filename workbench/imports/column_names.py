@@ -7,7 +7,7 @@ import re
 
 from workbench.imports.cell_units import unit_in_header
 
-SETPOINT = r"soll|\bsp\b|set ?point|consign|zadan|riferimento|b[öo]rv[äa]rde|gewenst|\breference\b"
+SETPOINT = r"soll|\bs[pv]\b|set ?point|consign|zadan|riferimento|b[öo]rv[äa]rde|gewenst|\breference\b"
 PROCESS_VALUE = (
     r"\bpv\b|\bist|process ?value|messwert|flow|durchfl|d[ée]bit|caudal|portata|przep[lł]yw|level|f[üu]llstand|"
     r"niv(el|eau)|temp[eé]rat"

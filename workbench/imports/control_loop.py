@@ -26,9 +26,11 @@ from workbench.imports.column_names import COMMON, PROCESS_VALUE, SETPOINT, is_c
 
 Array = npt.NDArray[np.float64]
 OUTPUT = COMMON["command_pa"][0]
-CONTROLLER = re.compile(r"\b[FLPTAQWDS][DFIQRY]*C[A-Z]*[ -]?\d", re.IGNORECASE)
+CONTROL_VARIABLE = r"\bcv\b"
+"""An output in Rockwell's and Ignition's words; DeltaV writes it behind every name, PV.CV, for the current value."""
+CONTROLLER = re.compile(r"(?<![A-Z])[FLPTAQWDS][DFIQRY]*C[A-Z]*[ -]?\d", re.IGNORECASE)
 """Tags of controllers by ISA-5.1: measured quantity, functions, C."""
-OF_VALVE = re.compile(r"\b[FLPTHX]C?V[ -]?\d", re.IGNORECASE)
+OF_VALVE = re.compile(r"(?<![A-Z])[FLPTHX]C?V[ -]?\d", re.IGNORECASE)
 """Tags of valves."""
 LEAST_OUT, MOST_OUT = -10.0, 110.0
 """An output in %, and with it one in mA or of 1."""
@@ -120,15 +122,21 @@ def _is_stem(column: LoopColumn) -> bool:
 
 def _role(column: LoopColumn) -> str | None:
     """Return what a column is of a loop by its name."""
-    for role, words in (("setpoint", SETPOINT), ("output", OUTPUT), ("process_value", PROCESS_VALUE)):
-        if is_called(words, column.name):
-            return role
-    return None
+    return next((role for role, words in WORDS if is_called(words, column.name)), None)
+
+
+WORDS = (
+    ("setpoint", SETPOINT),
+    ("output", OUTPUT),
+    ("process_value", PROCESS_VALUE),
+    ("output", CONTROL_VARIABLE),
+)
+"""By role, from the surest on."""
 
 
 def _tag(name: str, role: str) -> str:
     """Return what is left of a name without the words for what it is."""
-    words = {"setpoint": SETPOINT, "output": OUTPUT, "process_value": PROCESS_VALUE}[role]
+    words = next(words for each, words in WORDS if each == role)
     left = re.sub(rf"(?:{words})\w*|\b(?:value|CV)\b|[\[(<].*$", " ", split_words(name), flags=re.IGNORECASE)
     return " ".join(re.sub(rf"%|/|{PROCESS_UNITS.pattern}", " ", left, flags=re.IGNORECASE).split())
 

@@ -266,7 +266,7 @@ def _guess(table: RawTable) -> tuple[tuple[bool, int, int], Header] | None:
     written = tuple(map(str, cells))
     names = distinguish_names(written, next((row for number, row in rows if number == line - 1), ()))
     names = tuple(
-        f"#{index + 1}" if not named or (name and name in names[:index]) else name for index, name in enumerate(names)
+        f"#{index + 1}" if not named or not name or name in names[:index] else name for index, name in enumerate(names)
     )
     at = {name: (index,) for index, name in enumerate(names) if name}
     before = max((number for number, _ in rows if number < line), default=0)

@@ -14,7 +14,7 @@ import numpy.typing as npt
 
 from config.errors import InputError
 from workbench.imports.cell_kinds import may_be_clock, numbers_of
-from workbench.imports.cell_units import UNITS, with_any_unit
+from workbench.imports.cell_units import SHARES, UNITS, with_any_unit
 from workbench.imports.clock_groups import find_groups
 from workbench.imports.column_clock import clock_of
 from workbench.imports.column_proposal import is_clock
@@ -60,7 +60,7 @@ class LoopSamples:
 def read_loop(
     path: Path,
     named: Mapping[str, str] | None = None,
-    op_range: tuple[float, float] = (0.0, 100.0),
+    op_range: tuple[float, float] | None = None,
     time_format: str | None = None,
     decimal: str | None = None,
 ) -> LoopSamples:
@@ -69,7 +69,7 @@ def read_loop(
     Args:
         path: any export.
         named: columns by role, of `ROLES`, that a person names.
-        op_range: what the file has for 0 % and 100 % of the output.
+        op_range: what the file has for 0 % and 100 % of the output; None: as its unit says, else 0 and 100.
         time_format: how dates are written.
         decimal: the decimal sign; None: as the numbers show.
 
@@ -95,15 +95,7 @@ def read_loop(
     notes = {
         key: said for part, each in zip(parts, read, strict=True) for key, said in (part.notes | each.notes).items()
     }
-    low, high = op_range
-    op_pct = 100.0 * (columns["op"] - low) / (high - low)
-    known = op_pct[np.isfinite(op_pct)]
-    if known.size and (known.min() < LEAST_OUT or known.max() > MOST_OUT):
-        raise InputError(
-            str(path),
-            f"output {roles['op']!r} goes from {known.min():g} to {known.max():g}: no share in %; say what it has at "
-            "0 % and 100 %, as --op-range 0 27648",
-        )
+    op_pct = _percent(path, roles["op"], columns["op"], op_range or _range_in(parts, roles["op"]), notes)
     name = loop.tag if loop is not None and loop.tag else path.stem
     return LoopSamples(
         name,
@@ -115,6 +107,46 @@ def read_loop(
         columns["mode"] == 0.0 if "mode" in columns else None,
         notes,
     )
+
+
+def _range_in(parts: Sequence[Samples], output: str) -> tuple[float, float] | None:
+    """Return the numbers for 0 % and 100 % by the output's unit, above its column or behind its first number."""
+    units = [
+        unit
+        for part in parts
+        if (cells := part.cells.get(output))
+        for unit in (part.header.units.get(output, ("", 0))[0], with_any_unit(str(cells[0]))[1])
+    ]
+    factor, offset = next((SHARES[unit] for unit in units if unit in SHARES), (0.0, 0.0))
+    return (-offset / factor, (1.0 - offset) / factor) if factor else None
+
+
+def _percent(
+    path: Path, output: str, values: Array, op_range: tuple[float, float] | None, notes: dict[str, str]
+) -> Array:
+    """Return the output in %; where nobody says what it is in, numbers that may be mA get a note.
+
+    Raises:
+        InputError: it is no share in %, or may be one of 1.
+    """
+    low, high = op_range or (0.0, 100.0)
+    op_pct = 100.0 * (values - low) / (high - low)
+    known = op_pct[np.isfinite(op_pct)]
+    if not known.size:
+        return op_pct
+    least, most = float(known.min()), float(known.max())
+    goes = f"output {output!r} goes from {least:g} to {most:g}"
+    if least < LEAST_OUT or most > MOST_OUT:
+        raise InputError(str(path), f"{goes}: no share in %; say what it has at 0 % and 100 %, as --op-range 0 27648")
+    if op_range is None and most <= 1.0:
+        raise InputError(str(path), f"{goes}: a share of 1, or in %? Say --op-range 0 1, or --op-range 0 100")
+    if op_range is None and least >= LEAST_MA and most <= MOST_MA:
+        notes["unit of the output"] = f"{least:g} to {most:g} are taken for %; if they are mA, say --op-range 4 20"
+    return op_pct
+
+
+LEAST_MA, MOST_MA = 3.6, 21.0
+"""Signals of 4 to 20 mA that are no fault (NAMUR NE 43)."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -186,10 +218,11 @@ def _recognise(path: Path, roles: dict[str, str]) -> LoopColumns | None:
     found = preview(path)
     names = ", ".join(each.name for each in found.columns)
     say = f"say --time NAME --op NAME --pv NAME (--sp, --mode); there are: {names}"
-    if len(found.loops) > 1:
-        tags = ", ".join(each.tag for each in found.loops)
-        raise InputError(str(path), f"holds {len(found.loops)} loops, {tags}: {say}")
-    loop = found.loops[0] if found.loops else None
+    loops = [each for each in found.loops if _is_of(each, roles)]
+    if len(loops) > 1:
+        which = ", ".join(f"{each.output!r} of {each.tag}" for each in loops)
+        raise InputError(str(path), f"holds {len(loops)} loops; say which by --op NAME, its output: {which}")
+    loop = loops[0] if loops else None
     columns = [each.name for each in found.columns]
     stem = stem_by_name(columns) if loop is None else loop.position
     if stem and not roles:
@@ -213,6 +246,12 @@ def _recognise(path: Path, roles: dict[str, str]) -> LoopColumns | None:
     if "time" not in roles:
         raise InputError(str(path), f"no column looks like a time: {say}")
     return loop
+
+
+def _is_of(loop: LoopColumns, named: Mapping[str, str]) -> bool:
+    """Return whether a loop has the columns that a person named."""
+    theirs = {"op": loop.output, "pv": loop.process_value, "sp": loop.setpoint}
+    return all(role not in theirs or theirs[role] == name for role, name in named.items())
 
 
 def _mode_and_time(found: ExportPreview) -> dict[str, str]:

@@ -29,7 +29,7 @@ from workbench.loops.oscillation import Oscillation
 from workbench.loops.stem_and_process import cost_of, costs_of_stems, respond, rest_positions
 from workbench.loops.thresholds import LIMITS
 
-CAUSES_FORM = 3
+CAUSES_FORM = 4
 """To be raised when causes would come out differently: what was kept is then made anew."""
 SHARES = (0.12, 0.17, 0.24, 0.33, 0.44, 0.55, 0.66, 0.77, 0.87, 0.95)
 """Apparent stiction that is tried, of the output's span: less does not rule a loop, beyond it the stem never moves."""
@@ -119,7 +119,7 @@ class Causes:
     """Causes held against each other.
 
     Attributes:
-        costs: of the best of each cause, nats, less is better.
+        costs: of each cause, nats, less is better.
         evidence: for friction against the best of the others.
         friction: the best of it.
         lag_s, delay_s, gain: of its process; what lags second counts as delay; the gain in PV a % of the output.
@@ -214,14 +214,8 @@ def hold_causes(record: LoopRecord, oscillation: Oscillation, action: int) -> Ca
     held = _hold(rows, action, DELAYS)
     friction = _refined(rows, held, action)
     process = friction.process
-    costs = {
-        "friction": process.cost,
-        "linear": min(held.alone, held.phases, float(held.plain.costs.min())),
-        "nonlinear": min(held.alone, held.curve),
-        "disturbance": held.alone,
-    }
     return Causes(
-        costs,
+        held.costs,
         Evidence(held.witness, of_output(rows)),
         friction,
         process.lag * rows.period_s,
@@ -258,11 +252,20 @@ class _Held:
     curve: float
 
     @property
+    def costs(self) -> dict[str, float]:
+        """Cost of each cause, nats: of the mean likelihood where many are tried, of more weights by what they cost."""
+        return {
+            "friction": -self.trials.mean_likelihood,
+            "linear": min(-self.plain.mean_likelihood, self.phases + MORE_WEIGHTS),
+            "nonlinear": self.curve + MORE_WEIGHTS,
+            "disturbance": self.alone,
+        }
+
+    @property
     def witness(self) -> Witness:
         """What it says of friction."""
-        others = max(self.plain.mean_likelihood, -self.alone, -self.phases - MORE_WEIGHTS, -self.curve - MORE_WEIGHTS)
-        friction = self.trials.mean_likelihood
-        return Witness(friction - others, max(0.0, friction + self.alone))
+        friction, *others = self.costs.values()
+        return Witness(min(others) - friction, max(0.0, self.alone - friction))
 
 
 def _hold(rows: Rows, action: int, delays: Sequence[float]) -> _Held:
@@ -377,13 +380,7 @@ def _response(rows: Rows, stem: Array, process: Process, later: int = 0) -> Arra
 
 
 def _try(
-    rows: Rows,
-    sizes: Array,
-    jumps: Array,
-    manners: npt.NDArray[np.bool_],
-    action: int,
-    lags: Array,
-    delays: Array,
+    rows: Rows, sizes: Array, jumps: Array, manners: npt.NDArray[np.bool_], action: int, lags: Array, delays: Array
 ) -> _Trials:
     """Return stems with each lag and delay, in rows of the stem."""
     whole = np.unique(np.maximum(np.round(delays), 0.0)).astype(np.int64)

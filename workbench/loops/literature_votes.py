@@ -40,12 +40,7 @@ def votes(record: LoopRecord, oscillation: Oscillation) -> tuple[Vote, ...]:
     op, pv = averaged(record.op_pct, every), averaged(record.pv, every)
     sp = np.zeros(pv.size) if record.sp is None else averaged(record.sp, every)
     cycle = oscillation.period_s / record.period_s / every
-    return (
-        he(op, cycle),
-        hagglund(pv - sp, cycle),
-        horch(op, pv, cycle),
-        kano(op, pv, cycle),
-    )
+    return he(op, cycle), hagglund(pv - sp, cycle), horch(op, pv, cycle), kano(op, pv, cycle)
 
 
 def he(op: Array, cycle: float) -> Vote:

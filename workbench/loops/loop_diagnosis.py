@@ -1,7 +1,7 @@
 """The verdict on one loop: it sticks (how much), something else (what), or it cannot be told (why, what would tell)."""
 
 from collections.abc import Callable, Mapping
-from dataclasses import dataclass
+from dataclasses import asdict, dataclass
 from typing import TYPE_CHECKING, Any, Literal
 
 import numpy as np
@@ -74,13 +74,19 @@ class LoopDiagnosis(Result):
                 f"{friction.size.said} % of the output{jump}"
             )
         if self.verdict == "something else":
-            return f"{self.record.name}: not the valve's friction: {self.cause}"
+            return f"{self.record.name}: not the valve's friction: {self.because}"
+        if self.gates:
+            return f"{self.record.name}: insufficient: {self.because}"
+        return f"{self.record.name}: cannot be told (probability of sticking {self.sticks_said} %): {self.because}"
+
+    @property
+    def because(self) -> str:
+        """What else it is, or why it cannot be told, and what to do."""
         if self.gates:
             said = "; ".join(each.says for each in self.gates)
             instead = "; ".join(dict.fromkeys(each.instead for each in self.gates))
-            return f"{self.record.name}: insufficient: {said}; record {instead}"
-        percent = 100 * (self.probability or 0.0)
-        return f"{self.record.name}: cannot be told (probability of sticking {percent:.0f} %): {OPEN}"
+            return f"{said}; record {instead}"
+        return self.advice or self.cause or OPEN
 
     @property
     def sticks_said(self) -> str:
@@ -116,7 +122,10 @@ class LoopDiagnosis(Result):
     def cause_table(self) -> Table:
         """Causes as they were held against each other; no rows where none was."""
         costs = sorted(self.causes.costs.items(), key=lambda item: item[1]) if self.causes else []
-        return Table(("cause", "behind the best, nats"), [(name, f"{cost - costs[0][1]:.1f}") for name, cost in costs])
+        rows = [(name, f"{cost - costs[0][1]:.1f}") for name, cost in costs]
+        by = self.evidence
+        told = f"{by.pv.nats:+.1f} nats by PV, {by.output.nats:+.1f} by OP; sticks with {self.sticks_said} %"
+        return Table(("cause of PV", "behind the best, nats"), rows, f"Evidence for friction: {told}")
 
     @property
     def remedy_table(self) -> Table:
@@ -173,17 +182,9 @@ class LoopDiagnosis(Result):
             "period_s": self.oscillation.period_s,
             "regularity": self.oscillation.regularity,
             "variance_cost": self.variance_cost,
-            "controller": {
-                "gain": self.law.gain,
-                "reset_s": self.law.reset_s,
-                "explained": self.law.explained,
-                "action": self.law.action,
-            },
-            "insufficient": [{"code": g.code, "says": g.says, "instead": g.instead} for g in self.gates],
-            "remedies": [
-                {"name": r.name, "settings": r.settings, "error_ratio": r.error_ratio, "travel_ratio": r.travel_ratio}
-                for r in self.remedies
-            ],
+            "controller": asdict(self.law),
+            "insufficient": [asdict(each) for each in self.gates],
+            "remedies": [asdict(each) for each in self.remedies],
             "votes": {vote.method: {"index": vote.index, "says": vote.says} for vote in self.votes},
             "sentence": self.sentence,
             "advice": self.advice,

@@ -1,12 +1,13 @@
 """The samples of a loop on an even clock: output OP in %, process value PV and set point SP in the plant's units."""
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 import numpy.typing as npt
 
 from config.errors import InputError
 from config.results.result import Brief
+from workbench.imports.loop_reader import LoopSamples
 from workbench.loops.thresholds import LIMITS
 
 Array = npt.NDArray[np.float64]
@@ -74,7 +75,7 @@ class LoopRecord(Brief):
         own_s = time_s[kept]
         grid_s = own_s[0] + period_s * np.arange(round(float(own_s[-1] - own_s[0]) / period_s) + 1)
         if np.abs(np.diff(own_s) / period_s - 1.0).max() > 0.5:
-            notes.append("the clock is uneven: values are read between samples on straight lines")
+            notes.append("samples are missing, or the clock is uneven: values between are read on straight lines")
         values = [np.interp(grid_s, own_s, column[kept]) for column in (op_pct, pv)]
         rows = np.clip(np.searchsorted(time_s, grid_s + 0.5 * period_s) - 1, 0, time_s.size - 1)
         setpoint = None if sp is None or not np.isfinite(sp[rows]).any() else _held(sp[rows])
@@ -89,6 +90,17 @@ class LoopRecord(Brief):
             max(0.0, 1.0 - kept.size / grid_s.size),
             tuple(notes),
         )
+
+    @classmethod
+    def of_export(cls, read: LoopSamples, name: str | None = None) -> "LoopRecord":
+        """Return the record of an export that was read.
+
+        Raises:
+            InputError: as `of_samples`.
+        """
+        time_s = read.begin_s + read.time_s
+        record = cls.of_samples(name or read.name, time_s, read.op_pct, read.pv, read.sp, read.automatic)
+        return replace(record, notes=(*(f"{what}: {said}" for what, said in read.notes.items()), *record.notes))
 
     @property
     def duration_s(self) -> float:

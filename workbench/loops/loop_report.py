@@ -108,7 +108,7 @@ def _tables(each: LoopDiagnosis, name: str) -> page.Html:
     votes = _page_table(f"{name}-votes", each.vote_table)
     if each.causes is None:
         return page.Html(page.text("No causes were compared: the record is insufficient.") + votes)
-    return page.Html(_page_table(f"{name}-causes", each.cause_table) + votes)
+    return page.Html(page.text(each.cause_table.title) + _page_table(f"{name}-causes", each.cause_table) + votes)
 
 
 def _page_table(name: str, each: Table) -> page.Html:

@@ -12,11 +12,12 @@ with the most harmonics: friction makes them, and what is downstream of it filte
 
 import csv
 import os
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from concurrent.futures import ProcessPoolExecutor
 from dataclasses import dataclass
 from functools import partial
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 
@@ -69,7 +70,7 @@ class Plant:
                 each.sticks_said,
                 each.stiction_said,
                 f"{100 * each.variance_cost:.2g}",
-                each.cause or "; ".join(gate.says for gate in each.gates),
+                each.because,
             )
             for each in self.ranked
         ]
@@ -108,7 +109,11 @@ def read_manifest(path: Path) -> tuple[Entry, ...]:
 
 
 def diagnose_plant(
-    entries: Sequence[Entry], workers: int | None, tell: Callable[[LoopDiagnosis], None], out: Path | None = None
+    entries: Sequence[Entry],
+    workers: int | None,
+    tell: Callable[[LoopDiagnosis], None],
+    out: Path | None = None,
+    notation: Mapping[str, Any] | None = None,
 ) -> Plant:
     """Return the loops of a manifest, ranked.
 
@@ -117,6 +122,7 @@ def diagnose_plant(
         workers: processes; None: one a core.
         tell: is given each as it is done.
         out: folder in which what was worked out is kept; None: nothing is.
+        notation: how numbers and dates of all files are written, as `read_loop` takes it.
 
     Raises:
         InputError: the folder cannot be written, or is none of this.
@@ -125,8 +131,9 @@ def diagnose_plant(
     unreadable: list[tuple[str, str]] = []
     if out is not None:
         KeptResults(out, Causes)
+    one = partial(_diagnosed, out, notation or {})
     with ProcessPoolExecutor(max_workers=workers or os.cpu_count()) as pool:
-        for entry, found in zip(entries, pool.map(partial(_diagnosed, out), entries, chunksize=1), strict=True):
+        for entry, found in zip(entries, pool.map(one, entries, chunksize=1), strict=True):
             if isinstance(found, str):
                 unreadable.append((entry.loop, found))
             else:
@@ -135,16 +142,14 @@ def diagnose_plant(
     return Plant(tuple(sorted(done, key=_rank)), tuple(unreadable), tuple(find_groups(done)))
 
 
-def _diagnosed(out: Path | None, entry: Entry) -> LoopDiagnosis | str:
+def _diagnosed(out: Path | None, notation: Mapping[str, Any], entry: Entry) -> LoopDiagnosis | str:
     try:
-        read = read_loop(entry.file, dict(entry.named))
-        record = LoopRecord.of_samples(
-            entry.loop, read.begin_s + read.time_s, read.op_pct, read.pv, read.sp, read.automatic
-        )
+        read = read_loop(entry.file, dict(entry.named), **notation)
+        record = LoopRecord.of_export(read, entry.loop)
         if out is None:
             return diagnose_loop(record)
         kept = KeptResults(out, Causes)
-        key = key_of(entry.file, ["loop", CAUSES_FORM, entry.named])
+        key = key_of(entry.file, ["loop", CAUSES_FORM, entry.named, *sorted(notation.items())])
         before = kept.get(key)
         found = diagnose_loop(record, before)
         if before is None and found.causes is not None:

@@ -62,11 +62,7 @@ class _Loop:
 
 
 def find_remedies(
-    record_error: float,
-    law: ControllerLaw,
-    causes: Causes,
-    noise: float,
-    period_s: float,
+    record_error: float, law: ControllerLaw, causes: Causes, noise: float, period_s: float
 ) -> tuple[Remedy, ...]:
     """Return the remedies of a loop.
 
@@ -92,12 +88,7 @@ def find_remedies(
     band = abs(gain) * 0.5 * size
     shape = f"{0.5 * size:.2g} %"
     cases: list[tuple[str, str, _Loop, _Policy]] = [
-        (
-            "maintenance",
-            "packing and positioner: friction gone",
-            replace(loop, breaks=0.0, slides=0.0),
-            _Policy(),
-        ),
+        ("maintenance", "packing and positioner: friction gone", replace(loop, breaks=0.0, slides=0.0), _Policy()),
         ("half the gain", f"gain {0.5 * law.gain:.3g} % a unit of PV", detuned, _Policy()),
         ("dead band", f"integral part rests while |SP - PV| < {band:.3g}", loop, _Policy(dead_band=band)),
         (
@@ -155,9 +146,8 @@ def _simulated(loop: _Loop, policy: _Policy) -> tuple[float, float]:
             if wait <= 0 and abs(error) > policy.two_moves:
                 goal = stem + error / loop.process_gain
                 way = float(np.sign(goal - stem))
-                stem = min(
-                    max(goal, -LIMIT_PCT), LIMIT_PCT
-                )  # the first move: beyond the goal by f_d, and past where it breaks loose
+                # the first move: beyond the goal by f_d, and past where it breaks loose
+                stem = min(max(goal, -LIMIT_PCT), LIMIT_PCT)
                 held, wait = goal + loop.slides * way, settles
             command = held
         before = output

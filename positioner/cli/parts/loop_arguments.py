@@ -2,7 +2,7 @@
 
 import argparse
 from pathlib import Path
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Any
 
 from config.errors import InputError
 
@@ -21,18 +21,34 @@ def add_loop_arguments(parser: argparse.ArgumentParser) -> None:
         ("mode", "the controller's mode"),
     ):
         columns.add_argument(f"--{role}", metavar="NAME", help=f"the column of {what}")
-    columns.add_argument(
+    add_notation_arguments(columns)
+
+
+def add_notation_arguments(parser: argparse._ActionsContainer) -> None:
+    """Declare how numbers and dates of a file are written."""
+    parser.add_argument(
         "--op-range",
         type=float,
         nargs=2,
-        default=(0.0, 100.0),
         metavar=("AT0", "AT100"),
-        help="numbers of the file for 0 %% and 100 %% of OP",
+        help="numbers of the file for 0 %% and 100 %% of OP (0 100)",
     )
-    columns.add_argument(
+    parser.add_argument(
         "--decimal", choices=(".", ","), metavar="SIGN", help="decimal sign, . or , (the file's, where it is clear)"
     )
-    columns.add_argument("--time-format", metavar="FORMAT", help='format of the dates, as "%%d.%%m.%%Y %%H:%%M:%%S"')
+    parser.add_argument("--time-format", metavar="FORMAT", help='format of the dates, as "%%d.%%m.%%Y %%H:%%M:%%S"')
+
+
+def notation(arguments: argparse.Namespace) -> dict[str, Any]:
+    """Return how numbers and dates are written, as `read_loop` takes it.
+
+    Raises:
+        InputError: a range without width.
+    """
+    op_range = None if arguments.op_range is None else tuple(arguments.op_range)
+    if op_range and op_range[0] == op_range[1]:
+        raise InputError("--op-range", f"must have a width, got {op_range[0]:g} twice")
+    return {"op_range": op_range, "time_format": arguments.time_format, "decimal": arguments.decimal}
 
 
 def read_record(path: Path, arguments: argparse.Namespace) -> "LoopRecord":
@@ -42,11 +58,9 @@ def read_record(path: Path, arguments: argparse.Namespace) -> "LoopRecord":
         InputError: as `read_loop`; a range without width.
     """
     from workbench.imports.loop_reader import ROLES, read_loop
-    from workbench.loops.loop_record import LoopRecord
 
-    low, high = arguments.op_range
-    if low == high:
-        raise InputError("--op-range", f"must have a width, got {low:g} twice")
     named = {role: given for role in ROLES if (given := getattr(arguments, role))}
-    read = read_loop(path, named, (low, high), arguments.time_format, arguments.decimal)
-    return LoopRecord.of_samples(read.name, read.time_s, read.op_pct, read.pv, read.sp, read.automatic)
+    read = read_loop(path, named, **notation(arguments))
+    from workbench.loops.loop_record import LoopRecord  # after what may be refused: it loads all that diagnoses
+
+    return LoopRecord.of_export(read)

@@ -12,6 +12,7 @@ from config.errors import InputError
 from positioner.cli.main import main
 from workbench.bench.drawn_loops import draw_loop
 from workbench.imports.loop_reader import read_loop
+from workbench.loops import LoopRecord
 
 LOOP = draw_loop(10, "sticks")
 BEGIN = datetime(2026, 3, 2, 6, tzinfo=UTC)
@@ -87,8 +88,35 @@ def wincc() -> Iterator[str]:
             yield f'"FIC101_{name}";"{t:%d.%m.%Y %H:%M:%S}";' + f"{v[name]:.4f}".replace(".", ",") + ";1"
 
 
+def sampled_data() -> Iterator[str]:
+    """Yield PI's sampled data on a German desk: no word above the clock, and tags that begin with their unit."""
+    yield ";30FIC101.PV;30FIC101.SP;30FIC101.OUT;30FIC101.MODE"
+    for t, v in SOME:
+        yield f"{t:%d.%m.%Y %H:%M:%S};" + f"{v['PV']:.4f};{v['SP']:.4f};{v['OP']:.4f};AUTO".replace(".", ",")
+
+
+def ignition_history() -> Iterator[str]:
+    """Yield Ignition's history: a row a value, the output as its control variable CV."""
+    yield "tagpath,t_stamp,floatvalue,dataintegrity"
+    for t, v in SOME:
+        for theirs, name in (("PV", "PV"), ("CV", "OP")):
+            yield f"area1/FIC101/{theirs},{1000 * int(t.timestamp())},{v[name]:.4f},192"
+
+
 @pytest.mark.parametrize(
-    "form", [pi_datalink, aspen, ignition, ignition_script, grafana, grafana_unformatted, opc_hda, wincc]
+    "form",
+    [
+        sampled_data,
+        ignition_history,
+        pi_datalink,
+        aspen,
+        ignition,
+        ignition_script,
+        grafana,
+        grafana_unformatted,
+        opc_hda,
+        wincc,
+    ],
 )
 def test_another_programs_export_is_read_by_what_the_messages_say(
     form: Callable[[], Iterator[str]], tmp_path: Path
@@ -135,13 +163,18 @@ def counted(*periods: int) -> Callable[[int], str]:
         ("Time,FIC101.PV,FIC101.OP", scaled, "is in L/h and in m³/h"),
         ("Zeit;FIC101.PV;FIC101.MV", lambda row: f"{row};{100 + row};4{row % 9},125", "--decimal"),
         ("Time,FIC101.PV,FIC101.OP,FV101.ZT", counted(7, 9, 8), "positioner diagnose"),
-        ("Time,FIC1.PV,FIC1.OP,LIC2.PV,LIC2.OP", counted(7, 9, 5, 8), "holds 2 loops, FIC1, LIC2"),
+        (
+            "Time,FIC1.PV,FIC1.OP,LIC2.PV,LIC2.OP",
+            counted(7, 9, 5, 8),
+            "say which by --op NAME, its output: 'FIC1.OP' of FIC1, ",
+        ),
         ("time_s,command_pa,position_m", counted(7, 9), "positioner diagnose"),
         (
             "Time,FIC101.PV,FIC101.OP",
             lambda row: f"{row},{50 + row % 9},{9000 + 10 * (row % 7)}",
             "--op FIC101.OP --pv FIC101.PV --op-range 0 27648",
         ),
+        ("Time,FIC101.PV,FIC101.OP", lambda row: f"{row},{50 + row % 9},0.{40 + row % 7}", "--op-range 0 1,"),
         ("Time,FIC101.PV", counted(7), "no loop is recognised"),
     ],
 )
@@ -154,3 +187,21 @@ def test_what_a_person_must_say_is_one_line(
     error = capsys.readouterr().err
     assert said in error
     assert error.count("\n") == 1
+
+
+@pytest.mark.parametrize(("unit", "first", "note"), [(" [mA]", 50.0, ""), ("", 12.0, "--op-range 4 20")])
+def test_an_output_in_ma_is_told_by_its_unit_or_asked_for(unit: str, first: float, note: str, tmp_path: Path) -> None:
+    export = tmp_path / "export.csv"
+    rows = [f"{row},{50 + row % 9},{12 + 0.1 * (row % 7)}" for row in range(200)]
+    export.write_text("\n".join([f"Time,FIC101.PV,FIC101.OP{unit}", *rows]), encoding="utf-8")
+    read = read_loop(export)
+    assert read.op_pct[0] == pytest.approx(first)
+    assert note in "".join(LoopRecord.of_export(read).notes)
+
+
+def test_of_two_loops_the_output_says_which(tmp_path: Path) -> None:
+    export = tmp_path / "export.csv"
+    rows = map(counted(7, 9, 5, 8), range(200))
+    export.write_text("\n".join(["Time,FIC1.PV,FIC1.OP,LIC2.PV,LIC2.OP", *rows]), encoding="utf-8")
+    read = read_loop(export, {"op": "LIC2.OP"})
+    assert (read.name, read.pv[5], read.op_pct[5]) == ("LIC2", 50.0, 55.0)

@@ -1,3 +1,4 @@
+import re
 from dataclasses import replace
 from pathlib import Path
 
@@ -5,6 +6,7 @@ import numpy as np
 import pytest
 
 from config.errors import InputError
+from positioner.cli.main import main
 from workbench.bench.drawn_loops import draw_loop
 from workbench.loops import LoopDiagnosis, LoopRecord, diagnose_loop
 from workbench.loops.loop_report import report_loop, report_loops
@@ -59,7 +61,7 @@ def test_a_plants_page_has_a_line_a_loop_and_escapes_what_is_not_ours(
 ) -> None:
     report_loops(Plant((sticking, swinging), (("LIC3", "is empty"),), ()), tmp_path / "p.html", "plant.csv")
     page = (tmp_path / "p.html").read_text(encoding="utf-8")
-    assert "FIC101" in page
+    assert sticking.advice.replace(">", "&gt;") in page
     assert "LIC3" in page
     assert "<b>TIC7" not in page
 
@@ -93,3 +95,16 @@ def test_a_broken_manifest_is_said_in_a_line(tmp_path: Path, lines: str, said: s
     path.write_text(lines)
     with pytest.raises(InputError, match=said):
         read_manifest(path)
+
+
+def test_a_plants_dates_are_said_once_and_without_them_nothing_is_read(
+    tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    rows = [f"02-Mar-26 06:{row // 60:02}:{row % 60:02},{50 + row % 9},40" for row in range(200)]
+    (tmp_path / "a.csv").write_text("\n".join(["Time,FIC1.PV,FIC1.OP", *rows]))
+    (tmp_path / "m.csv").write_text("loop,file\nFIC1,a.csv\n")
+    words = ["loops", str(tmp_path / "m.csv"), "--workers", "1"]
+    assert main(words) == 2
+    (said,) = re.findall(r'--time-format "([^"]+)"', capsys.readouterr().err)
+    assert main([*words, "--time-format", said]) == 0
+    assert "the output stands at 40 %" in capsys.readouterr().out
