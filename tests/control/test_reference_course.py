@@ -49,6 +49,7 @@ def test_a_ramp_that_goes_farther_than_a_slide_is_followed_by_single_slides_ahea
     course, now_s = written([0.06 + 5e-4 * i for i in range(7)])
     assert course.goes_far(WAY_M)
     assert course.lead_m(now_s, WAY_M) == pytest.approx(0.5 * WAY_M)
+    assert course.lead_m(now_s, WAY_M, 0.2) == pytest.approx(0.5 * WAY_M + 1e-4), "it goes on by 1 mm/s"
     assert course.takes_back(now_s, 0.99 * WAY_M, WAY_M, 0.5)
     assert course.takes_back(now_s, -0.99 * WAY_M, WAY_M, 0.5)
     assert not course.takes_back(now_s + 0.8, 0.99 * WAY_M, WAY_M, 0.5), "it has ended"

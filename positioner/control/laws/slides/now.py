@@ -23,6 +23,8 @@ class Now:
     rest: Rest | None
     """None while the stem moves or may yet move."""
     quantum_m: float
+    answer_s: float = 0.0
+    """The longest that the stem has taken to answer, as far as is learnt."""
     reference_m: float
     balance: Balance
     bounds: SlideBounds
@@ -45,6 +47,7 @@ class Now:
             position_m=position_m,
             rest=rest,
             quantum_m=quantum_m,
+            answer_s=detector.answers.longest_s,
             reference_m=seen.reference_m,
             balance=balance,
             bounds=bounds,

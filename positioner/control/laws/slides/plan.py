@@ -152,7 +152,7 @@ class Plan:
     def lead_m(self, direction: int) -> float:
         """Return how far ahead of a ramp to land, m, where the site's bounds let it."""
         now, course = self.now, self.memory.course
-        lead_m = 0.0 if course is None else course.lead_m(now.now_s, self.way_m(direction))
+        lead_m = 0.0 if course is None else course.lead_m(now.now_s, self.way_m(direction), now.answer_s)
         to_m, (low_m, high_m) = now.reference_m + lead_m, now.balance.stops_m
         ahead = 0.0 < direction * lead_m <= now.bounds.excursion_limit_m and low_m <= to_m <= high_m
         return lead_m if ahead and now.bounds.allows(now.balance.pressure_pa(to_m, direction)) else 0.0

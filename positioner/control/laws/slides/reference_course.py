@@ -25,10 +25,11 @@ more than they save, as above.
 A ramp followed by slides of a way m, for no shorter one breaks the stem loose, leaves a sawtooth. Slides that land at
 the reference leave errors of 0 to m, rms m/sqrt(3), those that land ahead of it by half of m
 
-    -m/2 to m/2,   rms m/sqrt(12)      lead = min(m/2, N D)
+    -m/2 to m/2,   rms m/sqrt(12)      lead = min(m/2, N D) + v T_a/2
 
-with the same travel: no stem that can only be moved by m comes nearer. N D is as far as N references go. A ramp is
-taken to go on as far as it has gone since it turned: from m/2 on no excursion is made for it.
+with the same travel: no stem that can only be moved by m comes nearer. N D is as far as N references go, v T_a/2 as far
+as the ramp goes on while a slide that takes T_a is half-way. A ramp is taken to go on as far as it has gone since it
+turned: from m/2 on no excursion is made for it.
 """
 
 from dataclasses import dataclass
@@ -70,8 +71,10 @@ class ReferenceCourse:
             self.value_m if turns else self.turned_m,
         )
 
-    def slow_ramp_m_per_s(self, now_s: float) -> float:
-        """Return the rate of a ramp that is written in steps, m/s; 0: there is none, or it has come to its end."""
+    def rate_m_per_s(self, now_s: float) -> float:
+        """Return D/Δ of a run, with the mean interval, or the rate of a ramp in steps, m/s; 0: neither goes on."""
+        if not self.rests(now_s):
+            return sum(map(abs, self.changes_m)) / sum(self.intervals_s)
         if len(self.steps) < THRESHOLDS.steps_alike:
             return 0.0
         ways_m, intervals_s = zip(*self.steps, strict=True)
@@ -92,11 +95,6 @@ class ReferenceCourse:
         return sum(abs(each) for each in self.changes_m) / len(self.changes_m) if self.changes_m else 0.0
 
     @property
-    def rate_m_per_s(self) -> float:
-        """D/Δ, with the mean interval, m/s; 0 of a reference that came after a rest."""
-        return sum(abs(each) for each in self.changes_m) / sum(self.intervals_s) if self.intervals_s else 0.0
-
-    @property
     def trend(self) -> int:
         """s_r: +1 or -1 while it goes on in one direction."""
         last_m = self.changes_m[: THRESHOLDS.a_trend]
@@ -108,12 +106,12 @@ class ReferenceCourse:
         """Whether the run is a ramp that has gone half as far as a slide of way_m, the shortest: it goes on so far."""
         return self.trend != 0 and self.turned_m is not None and abs(self.value_m - self.turned_m) >= 0.5 * way_m
 
-    def lead_m(self, now_s: float, way_m: float) -> float:
-        """Return how far ahead of the reference, m, signed, a slide is to land, the shortest of which is way_m."""
+    def lead_m(self, now_s: float, way_m: float, answer_s: float = 0.0) -> float:
+        """Return how far ahead of the reference, m, signed, a slide is to land, of at least way_m, in answer_s."""
         if self.rests(now_s):
             return 0.0
-        coming_m = THRESHOLDS.coming * self.change_m
-        return self.trend * (0.5 * way_m if self.goes_far(way_m) else min(0.5 * way_m, coming_m))
+        half_m = 0.5 * way_m if self.goes_far(way_m) else min(0.5 * way_m, THRESHOLDS.coming * self.change_m)
+        return self.trend * (half_m + 0.5 * answer_s * self.rate_m_per_s(now_s))
 
     def _lasting_m(self, error_m: float) -> float:
         """Return the least error that the last references had of a stem that is off by an error now, m."""
@@ -129,16 +127,14 @@ class ReferenceCourse:
             way_m: the shortest slide that way.
             away_s: for how long the first of two slides leaves the stem away; 0: none was given yet.
         """
+        costs_more = abs(error_m) ** 3 <= 1.5 * way_m**2 * away_s * self.rate_m_per_s(now_s)
         if self.rests(now_s):
-            return abs(error_m) ** 3 <= 1.5 * way_m**2 * away_s * self.slow_ramp_m_per_s(now_s)
+            return costs_more
         lasting_m = abs(error_m) if self.trend else self._lasting_m(error_m)
         if lasting_m <= THRESHOLDS.taken_back * self.change_m or self.goes_far(way_m):
             return True
         coming_m = THRESHOLDS.coming * self.change_m
-        if self.trend * error_m < 0.0:
-            return abs(error_m) <= coming_m
-        if self.trend == 0:
-            return False
-        saves_m = (1.5 * way_m**2 * away_s * self.rate_m_per_s) ** (1 / 3)
-        costs_more = abs(error_m) <= max(way_m / sqrt(12.0), saves_m)
-        return costs_more or abs(error_m) + coming_m + abs(self.lead_m(now_s, way_m)) >= way_m
+        if self.trend * error_m <= 0.0:
+            return self.trend != 0 and abs(error_m) <= coming_m
+        reached = abs(error_m) + coming_m + abs(self.lead_m(now_s, way_m)) >= way_m
+        return costs_more or reached or abs(error_m) <= way_m / sqrt(12.0)
