@@ -243,8 +243,11 @@ def _require_order(columns: Mapping[str, Column]) -> None:
     if "time_s" not in columns:
         return
     time_s = columns["time_s"]
+    if not np.isfinite(time_s).all():
+        raise InputError("recording", f"time_s: sample {int((~np.isfinite(time_s)).argmax()) + 1} is not a number")
     back = np.flatnonzero(np.diff(time_s) <= 0.0)
-    if back.size > max(FEW_CLOCK_STEPS, CLOCK_STEPS_TOLERATED * time_s.size):
+    onward = time_s.size - 1 - back.size
+    if back.size > max(FEW_CLOCK_STEPS, CLOCK_STEPS_TOLERATED * time_s.size) or back.size > max(onward, 0):
         at = int(back[0]) + 1
         first = f"sample {at + 1} is at {time_s[at]:.9g} s after {time_s[at - 1]:.9g} s"
         raise InputError(

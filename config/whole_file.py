@@ -82,6 +82,15 @@ def filling(folder: Path) -> Iterator[Path]:
         raise
 
 
+def unreadable(path: Path) -> Path:
+    """Return the name under which a file that cannot be read is put aside: one that is put aside already stays."""
+    free, number = path.with_name(f"{path.name}.unreadable"), 1
+    while free.exists():
+        number += 1
+        free = path.with_name(f"{path.name}.unreadable{number}")
+    return free
+
+
 def sync_folder(folder: Path) -> None:
     """Force the names that a folder holds to the disk, where a folder can be opened: not on Windows.
 

@@ -17,6 +17,7 @@ from typing import Any
 
 from config.errors import InputError, explain_failure
 from config.lock_file import take_lock
+from config.whole_file import unreadable
 from positioner.history.entries import TABLES, Entry, Event, Setting
 
 FILE_NAME = "history.sqlite"
@@ -165,11 +166,12 @@ class HistoryFile:
 
     def _put_aside(self, reason: str) -> None:
         """Give a damaged file another name, with its log."""
+        aside = unreadable(self.path)
         for suffix in ("", *BEYOND_IDS):
             path = self.path.with_name(self.path.name + suffix)
             if path.exists():
-                path.replace(self.path.with_name(f"{FILE_NAME}.unreadable{suffix}"))
-        self.set_aside = f"{reason}; it is {FILE_NAME}.unreadable now"
+                path.replace(aside.with_name(aside.name + suffix))
+        self.set_aside = f"{reason}; it is {aside.name} now"
 
     def _delete_a_tenth(self) -> int:
         """Delete the oldest tenth of the table that has the most rows; return how many they were."""

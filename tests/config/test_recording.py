@@ -149,6 +149,11 @@ def test_what_is_no_column_of_numbers_is_refused_by_name(given: Any, got: str) -
             {name: np.zeros(15) for name in ("time_s", "command_pa", "position_m")},
             "time_s must increase: it does not at 14 of 15 samples; sample 2 is at 0 s after 0 s",
         ),
+        (
+            {"time_s": np.arange(5.0)[::-1]},
+            "time_s must increase: it does not at 4 of 5 samples; sample 2 is at 3 s after 4 s",
+        ),
+        ({"time_s": [0.0, 1.0, np.nan, 3.0, 4.0]}, "time_s: sample 3 is not a number"),
     ],
 )
 def test_what_is_no_recording_is_refused_when_it_is_made(changed: dict[str, Any], said: str) -> None:

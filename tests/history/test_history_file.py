@@ -285,13 +285,17 @@ def test_a_damaged_file_is_set_aside_whole_and_begun_anew(tmp_path: Path) -> Non
         file.append([event(number) for number in range(1, 2000)])
     path = tmp_path / FILE_NAME
     content = bytearray(path.read_bytes())
-    content[8192:12288] = random.Random(1).randbytes(4096)
-    path.write_bytes(content)
-    with opened(tmp_path) as file:
-        assert file.set_aside is not None
-        assert file.newest_event("FV 1") is None
-        file.append([event(1)])
-    assert (tmp_path / f"{FILE_NAME}.unreadable").read_bytes() == content
+    names = (f"{FILE_NAME}.unreadable", f"{FILE_NAME}.unreadable2")
+    for seed, name in enumerate(names):
+        content[8192:12288] = random.Random(seed).randbytes(4096)
+        path.write_bytes(content)
+        with opened(tmp_path) as file:
+            assert file.set_aside is not None
+            assert file.set_aside.endswith(f"it is {name} now")
+            assert file.newest_event("FV 1") is None
+            file.append([event(1)])
+        assert (tmp_path / name).read_bytes() == content
+    assert len({(tmp_path / name).read_bytes() for name in names}) == 2, "what was put aside before stays"
 
 
 def test_a_file_whose_columns_names_are_no_text_is_refused(tmp_path: Path) -> None:

@@ -217,7 +217,9 @@ def test_what_is_not_installed_is_named_with_its_extra(missing: str, asked: str,
     "make",
     [
         lambda: pos.Recording({name: np.array([]) for name in ("time_s", "command_pa", "position_m")}),
-        lambda: pos.Recording({name: np.array([np.nan]) for name in ("time_s", "command_pa", "position_m")}),
+        lambda: pos.Recording(
+            {"time_s": np.zeros(1), "command_pa": np.array([np.nan]), "position_m": np.array([np.nan])}
+        ),
         lambda: pos.respond(
             pos.Recording({"time_s": np.arange(9.0), "command_pa": np.zeros(9), "position_m": np.zeros(9)})
         ),

@@ -81,7 +81,7 @@ UNUSABLE: dict[str, tuple[Columns, str]] = {
     "kPa": (scaled("command_pa", 1e-3), "it looks like kPa or per cent (%)"),
     "measured bar": (sound() | {"pressure_pa": 1e-5 * sound()["command_pa"]}, "pressure_pa reaches"),
     "disordered": (disordered(), "time_s must increase: it does not at"),
-    "no time": (sound() | {"time_s": np.full(600, np.nan)}, "time_s: not every sample is a number"),
+    "no time": (sound() | {"time_s": np.full(600, np.nan)}, "time_s: sample 1 is not a number"),
     "empty": ({name: column[:0] for name, column in sound().items()}, "holds no samples"),
     "one sample": ({name: column[:1] for name, column in sound().items()}, ""),
     "no position": (sound() | {"position_m": np.full(600, np.nan)}, "position_m: no sample is a number"),

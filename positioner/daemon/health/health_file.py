@@ -16,7 +16,7 @@ from pydantic import Field
 
 from config.errors import InputError
 from config.loading import Fraction, Many, NonNegative, Schema, between, validate
-from config.whole_file import replace_whole
+from config.whole_file import replace_whole, unreadable
 from positioner.daemon.health.daily_figures import OperationDay
 from positioner.daemon.health.valve_conditions import CauseName, KeptConditions
 
@@ -103,8 +103,8 @@ def read_record(path: Path, valve: str, scales: Scales) -> KeptHealth:
     try:
         kept = _parsed(path, text, valve)
     except InputError as error:
-        path.replace(path.with_name(path.name + ".unreadable"))
-        return KeptHealth(problem=error.problem)
+        aside = path.replace(unreadable(path))
+        return KeptHealth(problem=f"{error.problem}; it is {aside.name} now")
     record = HealthRecord(**{each.name: getattr(kept, each.name) for each in fields(HealthRecord)})
     before = kept.scales
     others = [f"{key} was {before[key]}, is {now}" for key, now in scales.items() if before.get(key, now) != now]

@@ -147,7 +147,7 @@ def _say_of(stored: StoredHealth) -> None:
     """Log what of a file is not gone on with."""
     file, kept = str(stored.path), stored.kept
     if kept.problem is not None:
-        fields = {"file": file, "reason": kept.problem, "put_aside_as": ".unreadable"}
+        fields = {"file": file, "reason": kept.problem}
         log_event(log, logging.WARNING, "health record unreadable, counts start anew", **fields)
     if kept.rescaled is not None:
         reason = f"pressures are read by another scale: {kept.rescaled}"

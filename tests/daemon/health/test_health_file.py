@@ -67,6 +67,9 @@ def test_a_record_that_cannot_be_is_put_aside_and_told(tmp_path: Path, change: d
     assert problem.startswith(said)
     assert not path.exists()
     assert (tmp_path / "valve.json.unreadable").read_text() == spoilt
+    path.write_text("{")
+    assert "it is valve.json.unreadable2 now" in (read_record(path, "FV-1", SCALES).problem or "")
+    assert (tmp_path / "valve.json.unreadable").read_text() == spoilt, "what was put aside before stays"
 
 
 def test_a_baseline_of_another_scale_is_dropped_and_told_and_the_counts_stay(
