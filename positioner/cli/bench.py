@@ -45,7 +45,7 @@ def run(arguments: argparse.Namespace) -> int:
     if not (folder / CASES).exists():
         write_cases(folder, arguments.drawn, arguments.effects, arguments.first_seed, arguments.labelled)
     cases, results = read_cases(folder), folder / RESULTS
-    answers = read_results(results) if results.exists() else []
+    answers = read_results(results, cases) if results.exists() else []
     done = {(each.set, each.case) for each in answers}
     left = [each for each in cases if (each.set, each.name) not in done]
     with ProcessPoolExecutor(arguments.workers) as pool:
@@ -54,6 +54,6 @@ def run(arguments: argparse.Namespace) -> int:
             answers += found
             print(f"\r{count} of {len(left)} cases", end="" if count < len(left) else "\n", file=sys.stderr, flush=True)
     for path in arguments.judge:
-        answers += read_results(path)
+        answers += read_results(path, cases)
     print(*tell_scores(cases, answers), sep="\n")
     return 0

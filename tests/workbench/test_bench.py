@@ -7,7 +7,7 @@ import pytest
 
 from config.errors import InputError
 from positioner.cli.main import main
-from workbench.bench.cases import read_cases, write_cases
+from workbench.bench.cases import Case, read_cases, write_cases
 from workbench.bench.scores import Answer, add_results, area, area_interval, read_results, tell_scores
 
 HEAD = "set,case,file,truth,stiction_pct\n"
@@ -68,9 +68,14 @@ def test_of_a_hidden_effect_a_set_that_holds_it_names_it_and_another_name_is_wro
     [
         ("set,case,method\nd,1,x\n", "lacks the column score"),
         ("set,case,method,score\nd,1,x,1\nd,2,x,high\n", "line 3"),
+        ("set,case,method,score\nd,1,x,nan\n", "score must be a number"),
+        ("set,case,method,score\nd,1,x,1\nd,1,x,0\n", "line 3: x answers case 1 a second time"),
+        ("\ufeffset,case,method,score\ne,1,x,1\n", "line 2: there is no case 1 of set e"),
+        ("set,case,method,score,says\nd,1,x,1,maybe\n", "says must be sticks or nothing"),
     ],
 )
 def test_a_broken_results_file_is_said_in_a_line(tmp_path: Path, text: str, said: str) -> None:
-    (tmp_path / "r.csv").write_text(text)
+    (tmp_path / "r.csv").write_text(text, encoding="utf-8")
+    cases = [Case("d", name, (), "1", None) for name in "12"]
     with pytest.raises(InputError, match=said):
-        read_results(tmp_path / "r.csv")
+        read_results(tmp_path / "r.csv", cases)

@@ -9,8 +9,9 @@ The area under the ROC curve has a 95 % interval, by cases drawn anew 2000 times
 """
 
 import csv
-from collections.abc import Iterator, Sequence
+from collections.abc import Collection, Iterator, Sequence
 from dataclasses import astuple, dataclass, fields
+from math import isfinite
 from pathlib import Path
 
 import numpy as np
@@ -47,27 +48,40 @@ def add_results(path: Path, answers: Sequence[Answer]) -> None:
         writer.writerows(astuple(each) for each in answers)
 
 
-def read_results(path: Path) -> list[Answer]:
+def read_results(path: Path, cases: Sequence[Case]) -> list[Answer]:
     """Read a results file.
 
     Raises:
-        InputError: it cannot be read, lacks a column, or a number is none; says the line.
+        InputError: it cannot be read, lacks a column, or a line is no answer to a case; says the line.
     """
-    found = []
+    found: dict[tuple[str, str, str], Answer] = {}
+    known = {(each.set, each.name) for each in cases}
     try:
-        with path.open(encoding="utf-8", newline="") as file:
-            reader = csv.DictReader(file)
-            for row in reader:
+        with path.open(encoding="utf-8-sig", newline="") as file:
+            for row in csv.DictReader(file):
+                key = row["set"], row["case"], row["method"]
                 size = float(row["stiction_pct"]) if row.get("stiction_pct") else None
-                score = float(row["score"])
-                found.append(Answer(row["set"], row["case"], row["method"], score, row.get("says") or "", size))
+                answer = Answer(*key, float(row["score"]), row.get("says") or "", size)
+                if problem := _problem(answer, known, twice=key in found):
+                    raise ValueError(problem)
+                found[key] = answer
     except OSError as error:
         raise InputError(str(path), f"cannot be read: {error.strerror}") from None
     except KeyError as error:
         raise InputError(str(path), f"lacks the column {error.args[0]}") from None
     except ValueError as error:
         raise InputError(str(path), f"line {len(found) + 2}: {error}") from None
-    return found
+    return list(found.values())
+
+
+def _problem(answer: Answer, known: Collection[tuple[str, str]], *, twice: bool) -> str:
+    if (answer.set, answer.case) not in known:
+        return f"there is no case {answer.case} of set {answer.set}"
+    if twice:
+        return f"{answer.method} answers case {answer.case} a second time"
+    if answer.set != EFFECTS and answer.says not in ("", "sticks"):
+        return f"says must be sticks or nothing, got {answer.says}"
+    return "" if isfinite(answer.score) else f"score must be a number, got {answer.score}"
 
 
 def tell_scores(cases: Sequence[Case], answers: Sequence[Answer]) -> Iterator[str]:

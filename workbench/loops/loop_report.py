@@ -130,7 +130,7 @@ def _pictures(each: LoopDiagnosis, name: str, most: int) -> list[page.Html]:
     ]
 
 
-TIME_CAPTION = "OP, PV and SP over time; the stem as it is fitted."
+TIME_CAPTION = "OP, PV and SP over time, and the stem where one is fitted."
 PATH_CAPTION = "PV over OP: as recorded, and as a sticking stem gives it."
 SPECTRUM_CAPTION = "Amplitude of OP and PV by period, each over its largest."
 

@@ -64,15 +64,8 @@ class Plant:
     def ranking(self) -> Table:
         """A line a loop."""
         rows = [
-            (
-                each.record.name,
-                each.verdict,
-                each.sticks_said,
-                each.stiction_said,
-                f"{100 * each.variance_cost:.2g}",
-                each.because,
-            )
-            for each in self.ranked
+            (e.record.name, e.verdict, e.sticks_said, e.stiction_said, f"{100 * e.variance_cost:.2g}", e.because)
+            for e in self.ranked
         ]
         return Table(("loop", "", "sticks, %", "stiction, % of output", "error's std, % of PV", ""), rows)
 
