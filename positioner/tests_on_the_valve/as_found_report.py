@@ -137,10 +137,9 @@ class ValveReport:
                 if before.kind == "factory" or "factory" not in self.kept(test):
                     for each in changed:
                         if each.changed and each.means:
-                            told = (
-                                f"{each.quantity.text} {each.quantity.shown}, {TITLES[before.kind]} {each.before.shown}"
-                            )
-                            shown.setdefault(f"{TITLES[after.kind]}: {each.means}", []).append(f"{test}: {told}")
+                            told = f"{each.quantity.shown}, {TITLES[before.kind]} {each.before.shown}"
+                            line = f"{test}, {each.quantity.text}: {told}"
+                            shown.setdefault(f"{TITLES[after.kind]}: {each.means}", []).append(line)
         return [f"{means} ({'; '.join(figures)})" for means, figures in shown.items()]
 
     def heading(self) -> str:
