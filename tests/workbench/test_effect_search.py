@@ -82,7 +82,10 @@ class Engine:
     def advance(self, trial: ByHand) -> Trial:
         return trial
 
-    def finish(self, _: object, trial: ByHand) -> Fit:
+    def settled(self, trial: ByHand) -> ByHand:
+        return trial
+
+    def finish(self, _: object, trial: ByHand, __: float) -> Fit:
         return trial.fit
 
     def leave_off(self, _: object, trial: ByHand) -> Fit:
@@ -106,7 +109,17 @@ def searched(monkeypatch: pytest.MonkeyPatch) -> Searched:
         ends: Ends, *library: str, workers: int = 2, broken_off_after: float = np.inf
     ) -> tuple[EffectStep, ...]:
         engine = Engine(ends, broken_off_after)
-        for name in ("base_fit", "glimpse", "advance", "finish", "leave_off", "evaluated", "changes", "rank"):
+        for name in (
+            "base_fit",
+            "glimpse",
+            "advance",
+            "settled",
+            "finish",
+            "leave_off",
+            "evaluated",
+            "changes",
+            "rank",
+        ):
             monkeypatch.setattr(effect_search, name, getattr(engine, name))
         monkeypatch.setattr(effect_search, "Left", lambda *_: None)
         search = search_of({name: LIBRARY[name] for name in library}, monkeypatch, workers)

@@ -8,6 +8,7 @@ that no effect makes a valve worse.
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass, replace
 from functools import partial
+from math import inf
 
 from config.arguments import kinds_held
 from config.errors import InputError
@@ -155,7 +156,8 @@ def effect_fit(
     Raises:
         InputError: an unknown effect, one that is there, or one that the record cannot show.
     """
-    return finish(of, advance(glimpse(of, valve, effects, base, free=free, workers=workers, points=points)))
+    trial = glimpse(of, valve, effects, base, free=free, workers=workers, points=points)
+    return finish(of, settled(advance(trial)))
 
 
 @dataclass(frozen=True, slots=True)
@@ -203,7 +205,8 @@ def glimpse(
     for i, name in enumerate(BASE):
         sheet[i] = getattr(valve.valve, name)
     off = like.coordinates(fitted.theta)
-    searches: list[Callable[[], End]] = [lambda: descend(like, off, base.onsets_s, GLIMPSE)]
+    without = like.at(like.theta(off), base.onsets_s)
+    searches: list[Callable[[], End]] = []
     if like.run.hidden:  # friction stands in for a play where slides land: landings do not choose its width
         begins = strewn_starts(like, added, fitted, points)
         searches += [lambda z=z: _from_afar(like, z, GLIMPSE) for z in begins]  # type: ignore[misc]
@@ -215,13 +218,14 @@ def glimpse(
             begins = starts_by_landings(like, added, fitted, Origin(sheet), points)
             searches += [lambda z=z: _from_afar(like, z, GLIMPSE, chosen) for z in begins]  # type: ignore[misc]
     ends = list(on_threads(lambda search: search(), searches, workers))
+    if like.cost(without.whole) < _cheapest(ends).cost:
+        ends.append(descend(like, off, base.onsets_s, GLIMPSE))
     best = _cheapest(ends)
     other_order = in_other_order(like, best.z)
     if other_order is not None and not at_the_noise(best.cost, like.count):
         onsets_s, _ = with_onsets(like, like.theta(other_order), COARSE_ROUNDS)
         ends.append(descend(like, other_order, onsets_s, GLIMPSE))
-    begun = terms_of_all(like, like.at(like.theta(off), base.onsets_s))
-    return Trial(whole, tuple(sorted(ends, key=lambda each: each.cost)), begun)
+    return Trial(whole, tuple(sorted(ends, key=lambda each: each.cost)), terms_of_all(like, without))
 
 
 @linear_algebra_alone()
@@ -235,13 +239,32 @@ def advance(trial: Trial) -> Trial:
     return replace(trial, valleys=tuple(valleys))
 
 
+@dataclass(frozen=True, slots=True)
+class Settled:
+    """A valve with effects added, searched to the ends of its valleys, by either law within moves."""
+
+    like: Likelihood
+    ends: tuple[End, ...]
+
+    @property
+    def cost(self) -> float:
+        """Of the best end."""
+        return _cheapest(self.ends).cost
+
+
 @linear_algebra_alone()
-def finish(of: Problem, trial: Trial) -> Fit:
+def settled(trial: Trial) -> Settled:
     """Search to the end from the best valley of a trial, and from the next if it is nearly as good."""
     like, (first, *others) = trial.like, trial.valleys
     near = [first, *(each for each in others[:1] if each.cost < NEAR * first.cost)]
     found = [settle(like, descend(like.eased, each.z, each.onsets_s)) for each in near]
-    return _best(of, like, [end for ends in found for end in ends])
+    return Settled(like, tuple(end for ends in found for end in ends))
+
+
+@linear_algebra_alone()
+def finish(of: Problem, found: Settled, rival_cost: float = inf) -> Fit:
+    """Return the fit of the best end; its neighbourhood is searched, too, unless a rival's cost is far below."""
+    return _best(of, found.like, found.ends, is_near=found.cost < NEAR * rival_cost)
 
 
 @linear_algebra_alone()
@@ -321,10 +344,13 @@ def at_the_noise(cost: float, count: int) -> bool:
     return cost <= AT_THE_NOISE * 0.5 * count
 
 
-def _best(of: Problem, like: Likelihood, ends: Sequence[End]) -> Fit:
-    """Return the fit of the best of these ends, searched about by each law within moves that they are of."""
+def _best(of: Problem, like: Likelihood, ends: Sequence[End], *, is_near: bool = True) -> Fit:
+    """Return the fit of the best of these ends, searched about, if it is near, by each law that comes to its cost."""
     laws = [[each for each in ends if each.is_eased == eased] for eased in (False, True)]
-    best = _cheapest([search_about(_law(like, each[0]), _cheapest(each)) for each in laws if each])
+    least, best_of = _cheapest(ends).cost, [_cheapest(each) for each in laws if each]
+    if is_near:
+        best_of = [search_about(_law(like, each), each) for each in best_of if each.cost <= SAME_COST * least + NATS]
+    best = _cheapest(best_of)
     same = max(1, sum(each.cost <= SAME_COST * best.cost + NATS for each in laws[best.is_eased]))
     return fit_at(of, _law(like, best), best, same + 1 if at_the_noise(best.cost, like.count) else same)
 

@@ -13,16 +13,18 @@ are one by algebra stands in a model once. Where several effects explain all, wh
 asked again beside the others: while an effect is missing, its error hides what acts in few places.
 """
 
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Callable, Iterator, Mapping, Sequence
 from contextlib import closing
 from dataclasses import dataclass, field, replace
+from math import inf
+from typing import TypeVar
 
 from config.errors import InputError
 from config.valve_file import ValveFile
 from sim.effect import Effect
 from workbench.data.held_out import Split
 from workbench.fit.fit_result import Fit
-from workbench.fit.fitting import Trial, advance, base_fit, finish, glimpse, leave_off
+from workbench.fit.fitting import Trial, advance, base_fit, finish, glimpse, leave_off, settled
 from workbench.fit.problem import Problem, problem
 from workbench.fit.threads import on_threads
 from workbench.select.block_errors import block_errors
@@ -57,6 +59,8 @@ any evidence: what is left of a coarse search lowers its cost by a tenth, seldom
 FEWEST_GONE_ON = 3
 """Effects that are searched to their ends whatever they cost."""
 
+T = TypeVar("T")
+S = TypeVar("S")
 Progress = Callable[[str, float], None]
 Race = Callable[[int, str, float], None]
 """Told of a candidate that is fitted: step, effect, and the rms error, m, that it leaves."""
@@ -210,17 +214,19 @@ class EffectSearch:
         """Race effects beside a model: a glimpse of all, more of the better half, the end of what comes near."""
         # The dearest, which have the most parameters, first: begun last, they would keep one thread alone at work.
         ordered = sorted(names, key=lambda name: -len(self._library[name].parameters))
+        before = here.before.fit
+        known = ValveFile(valve=self._known.valve, effect=before.valve.effect)
         trials: dict[str, Trial | str] = {}
-        with closing(on_threads(lambda name: self._tried(here.before, name), ordered, self._workers)) as results:
-            for done, (name, trial) in enumerate(zip(ordered, results, strict=True), start=1):
-                trials[name] = trial
-                self._progress(f"step {number}: trying {len(ordered)} effects", done / len(ordered))
-        found = {name: each for name, each in trials.items() if isinstance(each, Trial)}
+        alone = {name: (name,) for name in ordered}
+        for name, trial in self._each(lambda effects: glimpse(self._problem, known, effects, before), alone):
+            trials[name] = trial
+            self._progress(f"step {number}: trying {len(ordered)} effects", len(trials) / len(ordered))
+        found = {name: each for name, each in trials.items() if not isinstance(each, str)}
         better = sorted(found, key=lambda name: found[name].cost)[: max(FEWEST_GONE_ON, (len(found) + 1) // 2)]
-        with closing(on_threads(lambda name: advance(found[name]), better, self._workers)) as results:
-            found |= dict(zip(better, results, strict=True))
+        advanced = dict(self._each(advance, {name: found[name] for name in better}))
+        found |= {name: each for name, each in advanced.items() if not isinstance(each, str)}
         promised = {
-            name: promise(each.terms, each.begun, len(each.like.parameters) - len(here.before.fit.parameters))
+            name: promise(each.terms, each.begun, len(each.like.parameters) - len(before.parameters))
             for name, each in found.items()
         }
         least = min((each.cost for each in found.values()), default=0.0)
@@ -235,31 +241,28 @@ class EffectSearch:
 
     def _fit(self, number: int, here: _Round, trials: Mapping[str, Trial | str], *, to_the_end: bool) -> None:
         """Fit what was tried beside a model, to the end or as far as it came."""
-        with closing(
-            on_threads(lambda each: self._fitted(each, to_the_end), tuple(trials.values()), self._workers)
-        ) as fits:
-            for name, each in zip(trials, fits, strict=True):
-                here.models[name] = each
-                if not isinstance(each, str):
-                    self._race(number, name, each.fit.rms_m)
+        if to_the_end:
+            ends = dict(self._each(settled, trials))
+            least = min((each.cost for each in ends.values() if not isinstance(each, str)), default=inf)
+            fits = self._each(lambda each: self.evaluated(finish(self._problem, each, least)), ends)
+        else:
+            fits = self._each(lambda each: self.evaluated(leave_off(self._problem, each)), trials)
+        for name, model in fits:
+            here.models[name] = model
+            if not isinstance(model, str):
+                self._race(number, name, model.fit.rms_m)
 
-    def _tried(self, before: EvaluatedModel, name: str) -> Trial | str:
-        """Return the trial of a model with an effect added, or why there is none."""
-        try:
-            known = ValveFile(valve=self._known.valve, effect=before.fit.valve.effect)
-            return glimpse(self._problem, known, (name,), before.fit)
-        except InputError as error:
-            return error.problem
+    def _each(self, function: Callable[[T], S], of: Mapping[str, T | str]) -> Iterator[tuple[str, S | str]]:
+        """Yield what a function makes of each by its name, or why it makes nothing."""
 
-    def _fitted(self, trial: Trial | str, to_the_end: bool) -> EvaluatedModel | str:
-        """Return the model of a trial, searched to the end or as far as it came."""
-        if isinstance(trial, str):
-            return trial
-        try:
-            fit = finish(self._problem, trial) if to_the_end else leave_off(self._problem, trial)
-            return self.evaluated(fit)
-        except InputError as error:
-            return error.problem
+        def made(each: T | str) -> S | str:
+            try:
+                return each if isinstance(each, str) else function(each)
+            except InputError as error:
+                return error.problem
+
+        with closing(on_threads(made, tuple(of.values()), self._workers)) as results:
+            yield from zip(of, results, strict=True)
 
     def _extended(self, here: _Round) -> list[tuple[_Round, bool]]:
         """Return the models to which the effects tried beside a model lead, if evident, and which are accepted.
@@ -276,7 +279,7 @@ class EffectSearch:
         ]
 
     def _evidence(self, before: EvaluatedModel, model: EvaluatedModel | str) -> float:
-        return -float("inf") if isinstance(model, str) else evidence_for(model.fit, before.fit)
+        return -inf if isinstance(model, str) else evidence_for(model.fit, before.fit)
 
     def _score(self, base: EvaluatedModel, model: EvaluatedModel) -> float:
         return score_above(model, base)
