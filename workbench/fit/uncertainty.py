@@ -3,13 +3,15 @@
     H = J' W^3 J + 1 / f^2   J the residuals by coordinates z and onsets, W = 1 / sqrt(1 + (r / s)^2): the
                              soft L1 has the slope W r and the curvature W^3; f = `FARTHEST`, the deviation of what
                              no residual hangs on
-    C = H^-1, but no less in any coordinate than (n - 1) / n sum_k d_k d_k'
+    C = H^-1, but no less in any coordinate than (n - 1) / n sum_k d_k^2, nor than (n - 1) / n sum_k e_k^2 / b
     d_k = (A - A_k)^-1 g_k   by how much the coordinates move without the k-th of n moves and the rest that it ends in;
                              A = sum_k A_k curvature by coordinates, onsets eliminated, g_k = J_k' W_k r_k
+    e_k = d_k + ... + d_(k + b - 1)     the same of b = `TOGETHER` moves in a row
 
-H^-1 is right where the residuals are the noise; the jackknife by moves (Tukey) where landings scatter by
-themselves, and every move is but one witness. An interval is z +- t sqrt C, t Student's with the degrees of freedom of
-those moves that tell of a coordinate (Satterthwaite; Bell and McCaffrey), v_k what the k-th brings to its variance:
+H^-1 is right where the residuals are the noise; the jackknife by moves (Tukey) where landings scatter by themselves,
+and every move is but one witness; that by blocks (Kuensch 1989) where moves in a row share what disturbs them. An
+interval is z +- t sqrt C, t Student's with the degrees of freedom of those moves that tell of a coordinate
+(Satterthwaite; Bell and McCaffrey), v_k what the k-th brings to its variance:
 
     nu = (sum v_k)^2 / sum v_k^2,   v_k = diag (A - A_k)^-1 A_k (A - A_k)^-1
 
@@ -23,7 +25,7 @@ as that onset,
     r_k / sqrt(1 + (dr_k / do_k)^2 / D_k)     D_k the curvature by the k-th onset
 
 Where break-aways scatter, s^2 = 2 cost / (n - 1) > 1, a force that no record holds breaks the stem loose, which it does
-early alone: the upper end goes up by its deviation, sqrt(s^2 - 1) L_0.
+early alone: the upper end goes up by `early` of its deviations, sqrt(s^2 - 1) L_0.
 
 A combination of parameters whose standard deviation exceeds 1, a factor of e, is not determined.
 """
@@ -49,6 +51,11 @@ NORMAL_QUANTILE = 1.96
 FEWEST_FREE = 2.0
 """Degrees of freedom of Student's t at least."""
 RISE_95 = 1.92
+TOGETHER = 3
+"""Moves in a row that one disturbance may outlast: slips of a ramp follow each other in some tenths of a second."""
+EARLY = 2.0
+"""Deviations by which what breaks a stem loose is above its mean: of six independent values the largest is 2.0 of its
+own above theirs (of two 0.7, of twenty 3.6). A stem that is slowly loaded is broken loose by the largest."""
 NOTHING = 1e-12
 """Of the largest eigenvalue of the scaled information: one that is none."""
 FARTHEST = 8.0
@@ -128,7 +135,7 @@ def _curvature(like: Likelihood, end: End) -> Curvature:
     inverse = (vectors / values) @ vectors.T
     without, free = _without_each_move(like, scaled, weight, r, count, (FARTHEST * scale[:count]) ** -2.0)
     moves = len(without)
-    apart = (moves - 1.0) / moves * np.sum(without**2, axis=0)
+    apart = (moves - 1.0) / moves * _square_sum(without)
     own = np.diag(inverse)[:count]
     std = np.minimum(np.sqrt(np.maximum(own, apart)) / scale[:count], FARTHEST)
     reach = np.where(apart > own, stdtrit(np.maximum(free, FEWEST_FREE), PROBABILITY), NORMAL_QUANTILE) * std
@@ -136,6 +143,13 @@ def _curvature(like: Likelihood, end: End) -> Curvature:
     off = -(inverse @ (scaled.T @ (weight * r)) / scale)[:count] / std
     by = np.outer(scale, scale)
     return Curvature(H * by, inverse / by, float(np.sqrt(values[-1] / values[0])), std, off, reach)
+
+
+def _square_sum(d: Vector) -> Vector:
+    """Return sum_k d_k^2 of each column, or by what TOGETHER moves in a row do as one, whichever is more."""
+    sums = np.cumsum(np.vstack([np.zeros((1, d.shape[1])), d]), axis=0)
+    rows = sums[TOGETHER:] - sums[:-TOGETHER]
+    return np.asarray(np.maximum(np.sum(d**2, axis=0), np.sum(rows**2, axis=0) / TOGETHER))
 
 
 def _without_each_move(
@@ -239,7 +253,7 @@ def _by_break_aways(like: Likelihood, theta: Vector, path: ToldPath, i: int, wid
     scatter = max(1.0, 2.0 * min(costs) / max(like.broken.size - 1, 1))
     near = np.flatnonzero(costs <= min(costs) + RISE_95 * scatter)
     low, high = float(at[max(near[0] - 1, 0)]), float(at[min(near[-1] + 1, at.size - 1)])  # where it is dearer already
-    early = np.sqrt(scatter - 1.0) * like.load_n / static_n[int(np.argmin(costs))]
+    early = EARLY * np.sqrt(scatter - 1.0) * like.load_n / static_n[int(np.argmin(costs))]
     return low, float(min(high + np.log1p(early), bounds[1]))
 
 
