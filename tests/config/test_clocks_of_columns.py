@@ -265,5 +265,25 @@ def test_a_clock_goes_by_the_unit_in_what_describes_it(labels: tuple[str, str], 
     np.testing.assert_allclose(read_export(tmp_path / "a.csv", sources, None).time_s, STEM_S - STEM_S[0])
 
 
+@pytest.mark.parametrize("form", ["%Y-%m-%d %H:%M:%S", "%d.%m.%Y %H:%M:%S", "%m/%d/%Y %I:%M:%S %p"])
+@pytest.mark.parametrize(("unit", "count"), [("ms", 1e3), ("100ns", 1e7), ("min", 1 / 60)])
+def test_begin_and_end_above_the_names_tell_what_a_clock_counts(
+    form: str, unit: str, count: float, tmp_path: Path
+) -> None:
+    """A scope's clocks without a unit last as long as its header says; a travel that only rises is no clock."""
+    begin, end = BEGIN.strftime(form), (BEGIN + datetime.timedelta(seconds=30)).strftime(form)
+    rows = [f"{count * t:.6f},{20 + t:.3f},{count * t:.6f},{t / 50}" for t in STEM_S]
+    export = tmp_path / "a.csv"
+    for first, last, told in ((begin, end, True), (begin, begin, False), (begin, "unknown", False)):
+        above = [f"StartTime,{first}", f"EndTime,{last}", ""]
+        export.write_text("\n".join([*above, "Name,xStem,Name,uCmd", *rows]))
+        shown = preview(export)
+        assert (f"time_s=Name:{unit}" in shown.words, f"'Name' counts {unit}" in shown.summary()) == (told, told)
+        sources = read_mapping(["time_s=#1", "position_m=xStem:mm", "command_pa=uCmd:bar"], None)
+        np.testing.assert_allclose(
+            read_export(export, sources, None).time_s, STEM_S * (1 if told else count), atol=1e-4
+        )
+
+
 def day(times_s: np.ndarray) -> list[str]:
     return [(BEGIN + datetime.timedelta(seconds=float(t))).strftime("%d.%m.%Y %H:%M:%S") for t in times_s]

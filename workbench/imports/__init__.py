@@ -17,6 +17,7 @@ From the file to the recording:
     export_mapping                          how an export is read, one object; kept in a file for next time
     column_mapping                          `OURS=THEIRS:UNIT`, `--status`
     header_search                           the line that names the columns, and the units about it
+    stated_duration                         the unit of its clocks, by the begin and the end above it
     cell_kinds, number_notation             what a cell may be; decimal signs and thousands separators
     sample_rows                             the samples under the header, as cells
     typed_columns                           a column in SI, each cell in its own unit

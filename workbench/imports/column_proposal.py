@@ -8,14 +8,12 @@ import shlex
 from collections import Counter
 from collections.abc import Iterator, Sequence
 from dataclasses import dataclass, field, replace
-from math import inf
-from pathlib import Path
+from math import inf, isnan
 
 import numpy as np
 import numpy.typing as npt
 
 from config.drive import KINDS, VALVE
-from config.errors import InputError
 from workbench.imports.cell_kinds import begins_number, may_be_clock, numbers_of
 from workbench.imports.cell_units import SHARES, UNITS, ending_of, list_allowed_units, unit_named
 from workbench.imports.column_clock import time_base
@@ -24,7 +22,7 @@ from workbench.imports.column_names import COMMON, COUNTER, SETPOINT, STATUS, is
 from workbench.imports.column_preview import GOOD, ColumnPreview, find_sign
 from workbench.imports.export_mapping import ExportMapping
 from workbench.imports.raw_table import Cell
-from workbench.imports.time_stamps import propose_formats, seconds_of
+from workbench.imports.time_stamps import duration_s, propose_formats
 
 Array = npt.NDArray[np.float64]
 STAMP = r"\d{4}-\d\d-\d\d"
@@ -136,14 +134,8 @@ def _span_s(clock: ColumnPreview) -> float:
         if np.isfinite(values).all():
             base = time_base(values)
             return abs(float(values[-1] - values[0])) * UNITS["_s"][base.unit if base else clock.unit or "s"]
-    texts = [str(cell) for cell in cells]
-    formats = [None] if all(re.match(STAMP, text) for text in texts) else propose_formats(texts)
-    if not formats:
-        return inf
-    try:
-        return abs(float(seconds_of(Path(), texts, range(len(texts)), formats[0])[0][-1]))
-    except InputError:
-        return inf
+    lasts_s = duration_s([str(cell) for cell in cells])
+    return inf if isnan(lasts_s) else lasts_s
 
 
 def _shares(mapped: Sequence[str], open_: list[str]) -> list[str]:

@@ -101,7 +101,7 @@ def _what(header: Header, tables: Sequence[RawTable]) -> str:
 
 def _place(header: Header) -> str:
     if header.line:
-        return f"{header.table.place} {header.line} names the columns"
+        return f"{header.table.place} {header.line} names the columns{header.lasts}"
     return "no line names the columns" if header.names[0] == "#1" else "its columns"
 
 

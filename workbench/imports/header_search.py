@@ -15,8 +15,9 @@ from pathlib import Path
 from config.errors import InputError
 from workbench.imports.cell_kinds import begins_number, may_be_clock
 from workbench.imports.cell_units import UNITS, unit_in_header, unit_named
-from workbench.imports.column_names import rank_by_name
+from workbench.imports.column_names import COMMON, rank_by_name
 from workbench.imports.raw_table import Cell, RawTable
+from workbench.imports.stated_duration import stated_duration_s, unit_by_duration
 
 SEARCHED = 300
 """Rows among which the header must be."""
@@ -46,6 +47,7 @@ class Header:
         unknown: what stands in a unit's place and is none that is known.
         as_written: the names before those that stand several times were told apart.
         clock: the name of the clock's column, among those asked for.
+        lasts: what the rows above say of the unit of clocks; "" where they are silent.
     """
 
     table: RawTable
@@ -57,6 +59,7 @@ class Header:
     unknown: Mapping[str, str] = field(default_factory=dict)
     as_written: tuple[str, ...] = ()
     clock: str | None = None
+    lasts: str = ""
 
 
 def find_header(path: Path, tables: Sequence[RawTable], wanted: Sequence[str], clock: str | None = None) -> Header:
@@ -201,7 +204,30 @@ def with_units(header: Header) -> Header:
                 units.setdefault(name, (unit, line))
             elif text:
                 unknown.setdefault(name, text)
-    return replace(header, samples_after=last, units=units, unknown=unknown)
+    return _with_stated_unit(replace(header, samples_after=last, units=units, unknown=unknown))
+
+
+def _with_stated_unit(header: Header) -> Header:
+    """Return the header with the unit of its clocks by the begin and the end that stand above it."""
+    lasts_s = stated_duration_s(cells for _, cells in islice(header.table.rows(), max(0, header.line - 1)))
+    if not lasts_s > 0.0:
+        return header
+    rows = [cells for _, cells in _from(header.table, header.samples_after, None)]
+    written, told = header.as_written or header.names, dict[str, tuple[str, int]]()
+    for name, (first, *_) in header.at.items():
+        if name in header.units or (name != header.clock and (header.clock or _is_signal(name))):
+            continue
+        alike = [index for index, each in enumerate(written) if each == written[first]]
+        columns = ([cells[index] for cells in rows if index < len(cells)] for index in alike)
+        if unit := unit_by_duration(columns, header.table.separator, lasts_s):
+            told[name] = (unit, header.line)
+    said = [f"; above it the recording lasts {lasts_s:g} s, so that {name!r} counts {told[name][0]}" for name in told]
+    return replace(header, units={**header.units, **told}, lasts=said[0] if said else "")
+
+
+def _is_signal(name: str) -> bool:
+    """Return whether a column is called like a signal, and not like a time."""
+    return rank_by_name("time_s", name) is None and any(rank_by_name(ours, name) is not None for ours in COMMON)
 
 
 def _unit_of_time_in(text: str) -> str | None:
@@ -210,7 +236,7 @@ def _unit_of_time_in(text: str) -> str | None:
     return unit if unit in UNITS["_s"] else None
 
 
-def _from(table: RawTable, line: int, count: int) -> Iterator[tuple[int, list[Cell]]]:
+def _from(table: RawTable, line: int, count: int | None) -> Iterator[tuple[int, list[Cell]]]:
     return islice((row for row in table.rows() if row[0] > line), count)
 
 

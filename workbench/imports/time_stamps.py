@@ -83,6 +83,15 @@ def seconds_of(
     return stamps - stamps[0], float(stamps[0]), naive
 
 
+def duration_s(texts: Sequence[str]) -> float:
+    """Return the seconds from the first of some stamps to the last; NaN where they cannot be read."""
+    time_format = next(iter(propose_formats(texts)), None)
+    try:
+        return abs(float(seconds_of(Path(), texts, range(len(texts)), time_format)[0][-1]))
+    except InputError:
+        return float("nan")
+
+
 def _swap_day_and_month(time_format: str) -> str:
     """Return a format with day and month interchanged."""
     return re.sub("%[dm]", lambda each: "%m" if each[0] == "%d" else "%d", time_format)
