@@ -172,7 +172,8 @@ def violated(stem: DrawnInside, found: Certificate, moves: int) -> Iterator[str]
             yield f"{slides} slides, and {found.most_slides} are proved"
         if max(farthest) > found.beyond_m + ROUNDING_M:
             yield f"{1e3 * max(farthest):.3g} mm beyond, and {1e3 * found.beyond_m:.3g} are proved"
-        if abs(stem.position_m - to_m) > found.ends_within_m + ROUNDING_M or not isinstance(stem.memory.state, Idle):
+        ended = isinstance(stem.memory.state, Idle) and stem.memory.stuck_at_m is None
+        if abs(stem.position_m - to_m) > found.ends_within_m + ROUNDING_M or not ended:
             yield f"ends {1e3 * abs(stem.position_m - to_m):.3g} mm off, {1e3 * found.ends_within_m:.3g} are proved"
         left_pa = stem.memory.command_pa
         for _ in range(3):

@@ -8,8 +8,7 @@ from pathlib import Path
 
 from config.codes import CAUSES, AlarmState, Code, EventKind, Ne107Cause, Ne107Status, Refusal, ValveTestVerdict
 from northbound.observer.register_words import CODES
-from positioner.control.laws.slides.states import State
-from positioner.control.laws.slides.transitions import COMMANDING, TABLE
+from positioner.control.laws.slides.transitions import TABLE, Rule
 from positioner.control.permissives import PERMISSIVES
 from positioner.daemon.health.ne107 import CLASS
 from positioner.daemon.service_state import table
@@ -104,17 +103,12 @@ def with_tables(document: str) -> str:
 
 def with_transitions(document: str) -> str:
     """Return `law.md` with the transitions of the law of slides between their marks."""
-    rows = [
-        f"| {_named(each.of)} | {each.when} | {_named(each.to) or 'the same, and more is known'} |" for each in TABLE
-    ]
-    head = ["| from | when | to |", "|---|---|---|"]
-    return _between(document, TRANSITIONS_BEGIN, TRANSITIONS_END, [*head, *rows])
+    rows = [f"| {each.when} | {_to(each)} | {', '.join(str(int(why)) for why in each.why)} |" for each in TABLE]
+    return _between(document, TRANSITIONS_BEGIN, TRANSITIONS_END, ["| when | to | `why` |", "|---|---|---|", *rows])
 
 
-def _named(states: tuple[type[State], ...]) -> str:
-    if states == COMMANDING:
-        return "any"
-    return ", ".join(each.__name__ for each in states) or "the same, and more is known"
+def _to(rule: Rule) -> str:
+    return ", ".join(each.__name__ for each in rule.to) or "the state stays"
 
 
 def _column(of: type[Entry], name: str) -> str:

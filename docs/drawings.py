@@ -34,7 +34,7 @@ REFERENCES = (0.5, 0.51)
 """Openings, p.u., one after the other."""
 NOISE_M = 1e-5
 INK, GREY = "#222222", "#888888"
-COLOURS = {"Idle": "#e8e8e8", "Sliding": "#9ecae1", "Out": "#fdae6b", "Returning": "#a1d99b", "Waiting": "#fde0dd"}
+COLOURS = {"Idle": "#e8e8e8", "Out": "#fdae6b", "Sliding": "#a1d99b"}
 
 
 @dataclass(frozen=True, slots=True)
@@ -126,7 +126,7 @@ def asked(requests: Requests, reference_m: float) -> Requests:
 MEANINGS = {
     "Idle": "Idle: the stem rests",
     "Out": "Out: a slide beyond the reference",
-    "Returning": "Returning: a slide back onto it",
+    "Sliding": "Sliding: a slide back onto it",
 }
 
 

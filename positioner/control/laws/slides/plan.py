@@ -22,13 +22,14 @@ Where the packing gives way, a stem under p is moved directly, by u = p + e/c, a
 """
 
 from dataclasses import dataclass
+from functools import cached_property
 from typing import NamedTuple
 
 from config.codes import InhibitReason
 from positioner.control.laws.slides.now import Now
-from positioner.control.laws.slides.slide_bounds import SlideBounds
+from positioner.control.laws.slides.slide_bounds import DAY_S, SlideBounds
 from positioner.control.laws.slides.slide_memory import SlideMemory
-from positioner.control.laws.slides.states import Slide
+from positioner.control.laws.slides.states import Out, Slide
 from positioner.estimation.landings.breakaway_distance import Interval
 from positioner.estimation.landings.landing_detector import VISIBLE
 from positioner.estimation.landings.packing_compliance import compliance
@@ -42,7 +43,7 @@ class Excursion(NamedTuple):
     beyond_m: float
 
 
-@dataclass(frozen=True, slots=True)
+@dataclass(frozen=True)
 class Plan:
     """A move to the reference from where a stem stands, m, by what is remembered."""
 
@@ -54,6 +55,17 @@ class Plan:
     def at_rest(cls, memory: SlideMemory, now: Now) -> "Plan":
         """Return that of a stem at rest: it begins where the last slide ended, whatever the packing has given since."""
         return cls(now, memory, now.at_rest.position_m if memory.anchor is None else memory.anchor.position_m)
+
+    @property
+    def used_up(self) -> bool:
+        """Whether the move has had its slides, save the second of two."""
+        return self.memory.move.left <= 0 and not isinstance(self.memory.state, Out)
+
+    @property
+    def left_away(self) -> bool:
+        """Whether a slide of the move has left the stem away."""
+        away_m = abs(self.now.reference_m - self.from_m)
+        return self.memory.move.given_s is not None and away_m > 0.5 * self.back_m(self.now.side)
 
     @property
     def surely(self) -> bool:
@@ -141,13 +153,26 @@ class Plan:
         return (by_its_side, by_the_other) if on_m <= longer * around_m else (by_the_other, by_its_side)
 
     def barred(self, each: Excursion) -> InhibitReason:
-        """Return which bound of the site bars an excursion; `NOTHING`: none does."""
+        """Return which bound of the site bars an excursion, what is spent of a day's travel last; `NOTHING`: none."""
         bounds, balance, (low_m, high_m) = self.now.bounds, self.now.balance, self.now.balance.stops_m
         if each.beyond_m > bounds.excursion_limit_m or not low_m <= each.by_m <= high_m:
             return InhibitReason.EXCURSION_BEYOND_LIMIT
         both = ((each.by_m, each.direction), (self.now.reference_m, -each.direction))
         allowed = all(bounds.allows(balance.pressure_pa(*to)) for to in both)
-        return InhibitReason.NOTHING if allowed else InhibitReason.LAW_BEYOND_LIMITS
+        if not allowed:
+            return InhibitReason.LAW_BEYOND_LIMITS
+        spent = 0.0 < bounds.budget_m_per_s * DAY_S < self.spent_m(each) and not self.left_away
+        return InhibitReason.EXCURSION_BUDGET_SPENT if spent else InhibitReason.NOTHING
+
+    def spent_m(self, each: Excursion) -> float:
+        """Return what is spent of a day's travel with an excursion, m."""
+        before = self.memory.excursions
+        return (before.spent_at_m(self.now.now_s, self.now.bounds) if before else 0.0) + 2 * each.beyond_m
+
+    @cached_property
+    def bars(self) -> tuple[tuple[Excursion, InhibitReason], ...]:
+        """The excursions by either side, with what bars each."""
+        return tuple((each, self.barred(each)) for each in self.excursions())
 
     def lead_m(self, direction: int) -> float:
         """Return how far ahead of a ramp to land, m, where the site's bounds let it."""

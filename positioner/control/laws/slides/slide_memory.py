@@ -4,8 +4,8 @@ from dataclasses import dataclass, replace
 
 from config.codes import InhibitReason
 from positioner.control.laws.slides.reference_course import ReferenceCourse
-from positioner.control.laws.slides.slide_bounds import DAY_S, SlideBounds
-from positioner.control.laws.slides.states import WATCHING, Idle, Slide, State, Stuck, Watching
+from positioner.control.laws.slides.slide_bounds import SlideBounds
+from positioner.control.laws.slides.states import WATCHING, Idle, Slide, State, Watching
 from positioner.estimation.landings.breakaway_distance import BreakawayDistance
 
 
@@ -64,12 +64,7 @@ class Row:
     before: BreakawayDistance
     held: int = 0
     stuck_at_m: float | None = None
-    """Where the stem was found stuck. It is until a slide breaks it loose, or it is seen elsewhere."""
-
-    @property
-    def stuck(self) -> bool:
-        """Whether the stem was found stuck, and has not been seen to move since."""
-        return self.stuck_at_m is not None
+    """Where the stem was found stuck. It is until a slide breaks it loose, or it is seen elsewhere: in any state."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -83,11 +78,6 @@ class Excursions:
     def spent_at_m(self, now_s: float, bounds: SlideBounds) -> float:
         """Return what is spent now of a day's travel, m: what has come back since is taken off."""
         return max(0.0, self.spent_m - bounds.budget_m_per_s * (now_s - self.begun_s))
-
-
-def day_m(bounds: SlideBounds) -> float:
-    """Return what excursions may cost in a day, m; 0: no limit."""
-    return bounds.budget_m_per_s * DAY_S
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -110,13 +100,15 @@ class SlideMemory:
     excursions: Excursions | None = None
 
     def inhibit_reason(self) -> InhibitReason:
-        """Return why the stem is off its reference; of one that nothing has broken loose no other reason matters."""
-        state, row = self.state, self.row
-        if isinstance(state, Stuck):
-            return InhibitReason.STUCK
-        reason = InhibitReason.NOTHING if isinstance(state, Watching) else state.reason
-        there = isinstance(state, Idle) and reason is InhibitReason.NOTHING
-        return InhibitReason.STUCK if row is not None and row.stuck and not there else reason
+        """Return why the stem is off its reference; of a stuck one no other reason matters."""
+        if isinstance(self.state, Watching) or self.state == Idle():
+            return InhibitReason.NOTHING
+        return InhibitReason.STUCK if self.stuck_at_m is not None else self.state.reason
+
+    @property
+    def stuck_at_m(self) -> float | None:
+        """Where the stem is stuck, m; None: it is not."""
+        return None if self.row is None else self.row.stuck_at_m
 
     @property
     def learnt(self) -> BreakawayDistance | None:

@@ -1,15 +1,13 @@
 """The states of the law of slides: a type each, with what it needs and nothing else.
 
-    Watching      another state commands
-    Idle          nothing is under way; why not, if the stem is off its reference
-    Sliding       one slide, on its way to the reference
+    Watching      another state of the daemon commands
+    Idle          nothing is under way
+    Sliding       a slide to the reference: the only one, or the second of two
     Out           the first of two: an excursion, beyond the reference or short of it
-    Returning     the second of two
     Presliding    its packing gives way under the stem, which is moved directly
-    Waiting       the stem does not come to rest, or not under the pressure commanded
-    Stuck         nothing breaks it loose
 
-Which follows which: `transitions.py`.
+Each but the first has a reason why the stem is off its reference: of one under way, why it does not come to rest. Which
+follows which: `transitions.py`.
 """
 
 from dataclasses import dataclass
@@ -51,7 +49,7 @@ class Idle:
 
 @dataclass(frozen=True, slots=True)
 class Sliding:
-    """One slide; None: given while the stem moved, or cut short by a limit of the pressure: it teaches nothing."""
+    """A slide; None: given while the stem moved, or cut short by a limit of the pressure: it teaches nothing."""
 
     slide: Slide | None
     reason: InhibitReason = InhibitReason.NOTHING
@@ -68,15 +66,6 @@ class Out:
     back_pa: float
     """What is held if something interrupts: under it the stem comes back."""
     reason: InhibitReason = InhibitReason.NOTHING
-    """Why it does not come to rest."""
-
-
-@dataclass(frozen=True, slots=True)
-class Returning:
-    """The second of two slides; None: cut short by a limit of the pressure."""
-
-    slide: Slide | None
-    reason: InhibitReason = InhibitReason.NOTHING
 
 
 @dataclass(frozen=True, slots=True)
@@ -90,24 +79,10 @@ class Presliding:
     reason: InhibitReason = InhibitReason.PRESLIDING
 
 
-@dataclass(frozen=True, slots=True)
-class Waiting:
-    """The stem is off its reference and does not come to rest, or not under what is commanded; a slide may be on."""
-
-    slide: Slide | None
-    reason: InhibitReason
-
-
-@dataclass(frozen=True, slots=True)
-class Stuck:
-    """No slide that a bound allows breaks the stem loose."""
-
-
-WATCHING, STUCK = Watching(), Stuck()
-State = Watching | Idle | Sliding | Out | Returning | Presliding | Waiting | Stuck
-STATES: tuple[type[State], ...] = (Watching, Idle, Sliding, Out, Returning, Presliding, Waiting, Stuck)
+WATCHING = Watching()
+State = Watching | Idle | Sliding | Out | Presliding
 
 
 def slide_of(state: State) -> Slide | None:
     """Return the slide under way, of which an outcome may tell something."""
-    return None if isinstance(state, Watching | Idle | Presliding | Stuck) else state.slide
+    return state.slide if isinstance(state, Sliding | Out) else None

@@ -31,7 +31,7 @@ def after_outcome(memory: SlideMemory, outcome: SlideOutcome, now: Now) -> Slide
 def _after_slide(memory: SlideMemory, outcome: SlideOutcome, now: Now) -> SlideMemory:
     thresholds = now.bounds.thresholds
     s, to_m, slide = outcome.direction, outcome.position_m, slide_of(memory.state)
-    if outcome.moved and memory.row is not None and memory.row.stuck:
+    if outcome.moved and memory.stuck_at_m is not None:
         memory = replace(memory, move=Move(thresholds.most_slides))
     if outcome.moved and (slide is None or slide.direction != s or not outcome.landing):
         return replace(memory, anchor=Anchor(to_m, s) if outcome.landing else None, row=None)
