@@ -60,7 +60,8 @@ endurance: $(READY)     ## an hour at 1 kHz and a month in virtual time: does an
 blind: $(READY)         ## hours, can be broken off: what is missing of the blind campaign, and its tables
 	$(BIN)/python -m benchmarks.blind
 
-moved: $(READY)         ## hours, can be broken off: what the workbench says of the kept cases otherwise than before
+moved: $(READY)         ## hours, can be broken off: what law and workbench do and say of the kept cases otherwise than before
+	$(BIN)/python -m benchmarks.kept_law
 	$(BIN)/python -m benchmarks.blind --moved build/moved.jsonl
 
 thresholds: $(READY)    ## hours for all, a sample by default: what a diagnosis says when a threshold is changed by 30 %

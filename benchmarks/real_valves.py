@@ -35,6 +35,7 @@ import logging
 from collections import Counter
 from collections.abc import Iterable, Iterator
 from dataclasses import dataclass, replace
+from typing import NamedTuple
 
 import numpy as np
 
@@ -168,6 +169,14 @@ class Disturbed(Late):
         self.command_pa = command_pa
 
 
+class Step(NamedTuple):
+    """What a step took: how far it went beyond, of the stroke, changes of the command, s until the last of them."""
+
+    beyond: float
+    slides: int
+    took_s: float
+
+
 class Loop:
     """A drawn valve with the daemon's cycle, in virtual time."""
 
@@ -221,12 +230,12 @@ class Loop:
         self.cycle.once()
         self.cycle.once()
 
-    def step_to(self, reference_m: float, longest_s: float) -> float:
-        """Ask for a position until the law has rested longer than a DCS's scan; return the farthest excursion, m."""
+    def step_to(self, reference_m: float, longest_s: float) -> Step:
+        """Ask for a position until the law has rested longer than a DCS's scan; return what that took."""
         at_m = self.valve.indicated_m
         low_m, high_m = min(at_m, reference_m), max(at_m, reference_m)
         self.ask(reference_m=reference_m, reference_writes=self.cycle.requests.reference_writes + 1)
-        farthest_m, last_pa = 0.0, float("nan")
+        farthest_m, last_pa, changes = 0.0, self.decision.command_pa, 0
         begin_s = since_s = self.time_s
         quiet_s = 1.5 + 40 * self._each.period_s + 20 * self._each.lag_s
         while self.time_s - begin_s < longest_s and self.time_s - since_s < quiet_s:
@@ -234,8 +243,8 @@ class Loop:
             x_m = self.valve.indicated_m
             farthest_m = max(farthest_m, low_m - x_m, x_m - high_m)
             if self.decision.command_pa != last_pa:
-                last_pa, since_s = self.decision.command_pa, self.time_s
-        return farthest_m
+                last_pa, since_s, changes = self.decision.command_pa, self.time_s, changes + 1
+        return Step(farthest_m / self._each.stroke_m, changes, since_s - begin_s)
 
     def left_alone(self, alone: "Alone") -> tuple[int, float]:
         """Return what happens from now on, but for the first while: changes of the command, travel in strokes."""
@@ -275,6 +284,7 @@ class Outcome:
     took_s: float
     landed: tuple[bool, ...]
     errors: tuple[float, ...]
+    taken: tuple[Step, ...]
     excursions: tuple[float, ...]
     """Over the least."""
     why: str
@@ -337,7 +347,7 @@ def outcome(
     decision = loop.decision
     if decision.applied.ratios is None:
         return each, Outcome(
-            decision.static_law.reason.name, 0.0, 0.0, loop.time_s, (), (), (), decision.inhibit_reason.name
+            decision.static_law.reason.name, 0.0, 0.0, loop.time_s, (), (), (), (), decision.inhibit_reason.name
         )
     took_s, worst = loop.time_s, probed(each, loop)
     residual = decision.static_law.residual_m / each.stroke_m
@@ -349,15 +359,15 @@ def outcome(
     longest_s = 20.0 + 400 * each.period_s + 60 * each.lag_s
     at = 0.5 * (low + high)
     loop.step_to(at * each.stroke_m, longest_s)
-    errors, excursions = [], []
+    errors, taken, excursions = [], [], []
     for _ in range(steps):
         size = np.exp(rng.uniform(np.log(SMALLEST), np.log(LARGEST))) * rng.choice((-1, 1))
         before_m = loop.valve.indicated_m
         at = at + size if low < at + size < high else at - size
         at = min(max(at, low), high)
-        farthest_m = loop.step_to(at * stroke_m, longest_s)
+        taken.append(loop.step_to(at * stroke_m, longest_s))
         errors.append(loop.valve.indicated_m / stroke_m - at)
-        excursions.append(farthest_m / least_excursion_m(each, before_m, at * stroke_m))
+        excursions.append(taken[-1].beyond * stroke_m / least_excursion_m(each, before_m, at * stroke_m))
     allowed = max(WITHIN, each.quantum_m / each.stroke_m)
     why = loop.decision.inhibit_reason.name
     changes, strokes = loop.left_alone(alone) if alone.duration_s else (0, 0.0)
@@ -368,6 +378,7 @@ def outcome(
         took_s,
         tuple(abs(e) <= allowed for e in errors),
         tuple(errors),
+        tuple(taken),
         tuple(excursions),
         why,
         changes,

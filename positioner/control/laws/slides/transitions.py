@@ -240,7 +240,7 @@ def nothing_breaks_loose(plan: Plan) -> SlideMemory | None:
     )
 
 
-def barred(plan: Plan) -> SlideMemory:
+def limits_end_it(plan: Plan) -> SlideMemory:
     """End the move: by its number of slides, or by a bound of the site, of which the pressure is said first."""
     bars = {bar for _, bar in plan.bars} if plan.memory.move.left >= 2 else {NOTHING}
     told = (NOTHING, InhibitReason.LAW_BEYOND_LIMITS, InhibitReason.EXCURSION_BEYOND_LIMIT)
@@ -329,7 +329,7 @@ AT_REST: tuple[Rule, ...] = (
     Rule(two_slides, (Out,), (NOTHING,), "two slides are left, and no limit bars an excursion"),
     Rule(day_spent, (Idle,), (InhibitReason.EXCURSION_BUDGET_SPENT,), "what excursions may cost in a day is spent"),
     Rule(nothing_breaks_loose, (Idle,), (InhibitReason.STUCK,), HELD),
-    Rule(barred, (Idle,), BARS, "else: no slide is left, or a limit bars it"),
+    Rule(limits_end_it, (Idle,), BARS, "else: no slide is left, or a limit bars it"),
 )
 TABLE = (*MOVING, *AT_REST)
 
