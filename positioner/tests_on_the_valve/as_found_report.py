@@ -107,10 +107,11 @@ class ValveReport:
         rows = []
         for name in names:
             told = [figures.get(name) for figures in by_kind.values()]
-            first = next(each for each in told if each is not None)
+            first = min((each for each in told if each is not None), key=lambda each: not each.figure.plus_minus)
             shown = (self._shown(each, record) for each, record in zip(told, kept.values(), strict=True))
-            recommended = replace(first, expected=self._recommended(first).value).shown_expected
-            rows.append((first.text, recommended, *shown))
+            wanted = self._recommended(first)
+            stated = replace(first, expected=wanted.value).shown_expected
+            rows.append((first.text, replace(first, figure=wanted).shown if wanted.plus_minus else stated, *shown))
         verdicts = ("verdict", "", *(record.outcome.said for record in kept.values()))
         return Table(("figure", "recommended ", *(f"{TITLES[kind]} " for kind in kept)), [verdicts, *rows], test)
 

@@ -78,11 +78,13 @@ class Quantity:
 
     @property
     def shown_expected(self) -> str:
-        """What it should be in the same unit; empty where nobody has said."""
+        """What it should be in the same unit, to the first digit of the +- beside it; empty where nobody has said."""
         if self.expected is None:
             return ""
         scale, unit = SHOWN.get(self.unit, (1.0, self.unit))
-        return f"{scale * self.expected:.5g} {unit}"
+        value, error = scale * self.expected, scale * (self.figure.plus_minus or 0.0)
+        two = digits(abs(value)) if value else 0
+        return f"{round(value, max(two, digits(error) - 1) if error else two + 1):.10g} {unit}"
 
 
 @dataclass(frozen=True, slots=True)

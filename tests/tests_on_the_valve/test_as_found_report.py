@@ -175,7 +175,7 @@ def test_the_factorys_record_is_recommended_before_what_the_file_was_commissione
     keep(tmp_path, STROKES, "as_left", 2e9, {})
     report = ValveReport("FV-1", records(tmp_path), by_file={"opening_s": 3.0})
     (opens,) = (row for row in report.table("commissioning").rows if row[0] == "opens within")
-    assert opens[1:] == ("1.1 s", "1.100 ± 0.050 s", "1.100 ± 0.050 s")
+    assert opens[1:] == ("1.100 ± 0.050 s", "1.100 ± 0.050 s", "1.100 ± 0.050 s")
 
 
 @pytest.mark.parametrize(
@@ -203,6 +203,25 @@ def test_a_place_is_held_against_what_its_kind_spans_and_every_figure_against_bo
     (row,) = (row for row in report.table("signature").rows if row[0] == "it")
     assert [cell.endswith("*") for cell in row[2:]] == [marked, False]
     assert bool(report.findings()) is means
+
+
+@pytest.mark.parametrize(
+    ("by_file", "found", "shown"),
+    [
+        (0.1016, Figure(0.10143, 5e-5), "101.6 mm"),
+        (0.0412345, Figure(0.0401, 3e-4), "41.2 mm"),
+        (0.0412345, Figure(0.0401, 0.02), "41 mm"),
+        (0.0412345, Figure(None, None, "it did not move"), "41.2 mm"),
+        (0.0, Figure(1e-5, 1e-6), "0 mm"),
+    ],
+)
+def test_what_is_recommended_has_the_digits_that_what_was_found_can_be_held_against(
+    tmp_path: Path, by_file: float, found: Figure, shown: str
+) -> None:
+    travel = Quantity("travel_m", "travel", "m", found)
+    keep(tmp_path, Outcome("signature", "FV-1", (travel,), (ValveTestVerdict.PASSED,)), "as_found", 1e9, {})
+    (row,) = ValveReport("FV-1", records(tmp_path), by_file={"travel_m": by_file}).table("signature").rows[1:]
+    assert row[1] == shown
 
 
 def test_what_the_file_says_is_recommended() -> None:
