@@ -6,7 +6,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from workbench.loops.loop_record import Array, LoopRecord
-from workbench.loops.oscillation import Oscillation
+from workbench.loops.oscillation import POWER, Oscillation
 from workbench.loops.thresholds import LIMITS
 
 
@@ -59,12 +59,12 @@ def _of_samples(record: LoopRecord, oscillation: Oscillation) -> Iterator[Gate]:
             "longer, over a few of its turns",
         )
     a_cycle = oscillation.period_s / record.period_s
-    if a_cycle < LIMITS.fewest_a_cycle:
-        yield Gate(
-            "slow",
-            f"{a_cycle:.1f} samples a cycle are too few",
-            f"a sample every {oscillation.period_s / 20.0:.2g} s",
-        )
+    if a_cycle < LIMITS.fewest_a_cycle and oscillation.regular:
+        finer_s = oscillation.period_s / 20.0
+        yield Gate("slow", f"{a_cycle:.1f} samples a cycle are too few", f"a sample every {finer_s:.2g} s")
+    elif a_cycle < LIMITS.fewest_a_cycle:
+        noise = f"{1.0 - POWER:.0%} of the output's power swings within {a_cycle:.1f} samples, as noise does"
+        yield Gate("slow", noise, "PV behind a filter, so that the output is less noisy")
     if record.missing > LIMITS.most_missing:
         yield Gate("missing", f"{100 * record.missing:.0f} % of the samples have no value", "a whole stretch")
 

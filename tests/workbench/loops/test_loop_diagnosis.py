@@ -92,6 +92,7 @@ def test_what_the_loops_own_output_says_does_not_hang_on_the_process_value() -> 
         ("short", lambda r: replace(r, op_pct=r.op_pct[:80], pv=r.pv[:80], sp=None)),
         ("one way", lambda r: replace(r, op_pct=np.linspace(20.0, 60.0, r.pv.size) + 0.1 * r.op_pct)),
         ("missing", lambda r: replace(r, missing=0.2)),
+        ("slow", lambda r: replace(r, op_pct=40.0 + 5.0 * np.sin(np.arange(r.pv.size)))),
     ],
 )
 def test_what_a_record_cannot_tell_is_said_and_what_to_record_instead(code, broken) -> None:  # type: ignore[no-untyped-def]
@@ -100,6 +101,16 @@ def test_what_a_record_cannot_tell_is_said_and_what_to_record_instead(code, brok
     assert code in [each.code for each in found.gates]
     assert all(each.instead for each in found.gates)
     assert "insufficient" in found.sentence
+
+
+@pytest.mark.parametrize("deviations", [1.0, 1.5, 3.0])
+def test_noise_of_the_output_is_not_said_to_be_a_cycle(deviations: float) -> None:
+    record = record_of(draw_loop(10, "sticks"))
+    noise = deviations * record.op_pct.std() * np.random.default_rng(0).standard_normal(record.pv.size)
+    (gate,) = diagnose_loop(replace(record, op_pct=record.op_pct + noise)).gates
+    assert gate.code == "slow"
+    assert "as noise does" in gate.says
+    assert "filter" in gate.instead
 
 
 def test_lines_that_a_historian_drew_are_seen() -> None:
