@@ -44,6 +44,16 @@ def digits(plus_minus: float) -> int:
     return 1 - floor(log10(plus_minus))
 
 
+def round_to(value: float, plus_minus: float) -> float:
+    """Return a value that has no +- of its own, to the first digit of the +- beside it; without one to three digits.
+
+    >>> round_to(101.6, 0.05), round_to(41.2345, 20.0), round_to(0.43714, 0.0), round_to(12345.6, 0.0)
+    (101.6, 41.0, 0.437, 12346.0)
+    """
+    two = digits(abs(value)) if value else 0
+    return round(value, max(two, digits(plus_minus) - 1) if plus_minus else max(0, two + 1))
+
+
 @dataclass(frozen=True, slots=True)
 class Quantity:
     """A figure of a test: what it is called, its SI unit, its value; `expected` is what it should be, where known."""
@@ -71,7 +81,7 @@ class Quantity:
         scale, unit = SHOWN.get(self.unit, (1.0, self.unit))
         value, error = scale * self.figure.value, scale * (self.figure.plus_minus or 0.0)
         if error == 0.0:
-            return f"{value:.5g} {unit}"
+            return f"{round_to(value, 0.0):.10g} {unit}"
         places = digits(error)
         value, error = round(value, places), round(error, places)
         return f"{value:.{max(0, places)}f} ± {error:.{max(0, places)}f} {unit}"
@@ -83,8 +93,7 @@ class Quantity:
             return ""
         scale, unit = SHOWN.get(self.unit, (1.0, self.unit))
         value, error = scale * self.expected, scale * (self.figure.plus_minus or 0.0)
-        two = digits(abs(value)) if value else 0
-        return f"{round(value, max(two, digits(error) - 1) if error else two + 1):.10g} {unit}"
+        return f"{round_to(value, error):.10g} {unit}"
 
 
 @dataclass(frozen=True, slots=True)

@@ -18,7 +18,7 @@ from workbench.imports.time_stamps import duration_s
 
 BEGIN, END = "start|begin|anfang|d[eé]but|inici|inizi|pocz", "end|stop|fin|koniec"
 """How the label of either is called, in the languages of `column_names`."""
-ALIKE = 0.1
+DURATION_TOLERANCE = 0.1
 """Of the duration: stamps in whole seconds and a last step are less, and units lie apart by ten and more."""
 
 
@@ -46,5 +46,5 @@ def unit_by_duration(columns: Iterable[Sequence[Cell]], separator: str, lasts_s:
             continue
         counted = counted[np.isfinite(counted)]
         spans = {unit: factor * float(np.ptp(counted)) for unit, factor in UNITS["_s"].items() if unit != "iso"}
-        found |= {unit for unit, span_s in spans.items() if abs(span_s / lasts_s - 1.0) < ALIKE}
+        found |= {unit for unit, span_s in spans.items() if abs(span_s / lasts_s - 1.0) < DURATION_TOLERANCE}
     return found.pop() if len(found) == 1 else None
