@@ -103,7 +103,7 @@ def with_tables(document: str) -> str:
 
 def with_transitions(document: str) -> str:
     """Return `law.md` with the transitions of the law of slides between their marks."""
-    rows = [f"| {each.when} | {_to(each)} | {', '.join(str(int(why)) for why in each.why)} |" for each in TABLE]
+    rows = [f"| {each.when} | {_to(each)} | {', '.join(str(int(why)) for why in each.why if why)} |" for each in TABLE]
     return _between(document, TRANSITIONS_BEGIN, TRANSITIONS_END, ["| when | to | `why` |", "|---|---|---|", *rows])
 
 

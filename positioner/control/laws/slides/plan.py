@@ -43,7 +43,7 @@ class Excursion(NamedTuple):
     beyond_m: float
 
 
-@dataclass(frozen=True)
+@dataclass
 class Plan:
     """A move to the reference from where a stem stands, m, by what is remembered."""
 

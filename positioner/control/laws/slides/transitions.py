@@ -312,24 +312,24 @@ class Rule(NamedTuple):
 
 WAITS = (InhibitReason.NOT_AT_REST, InhibitReason.PRESSURE_ELSEWHERE)
 CUT_SHORT, ENDED = (NOTHING, InhibitReason.LAW_BEYOND_LIMITS), (InhibitReason.TRIM_ENDED,)
-HELD = "three slides in a row held the stem, or one of the whole way, or it was stuck and has not moved since"
-BARS = (*ENDED, InhibitReason.EXCURSION_BEYOND_LIMIT, InhibitReason.LAW_BEYOND_LIMITS)
+HELD = "three slides in a row held it, one of the whole way did, or it is stuck"
+BARS = (InhibitReason.LAW_BEYOND_LIMITS, *ENDED, InhibitReason.EXCURSION_BEYOND_LIMIT)
 MOVING: tuple[Rule, ...] = (
     Rule(gone_far_enough, (Sliding,), CUT_SHORT, "Out: the stem is far enough beyond the reference"),
     Rule(reference_far_off, (Sliding,), (NOTHING,), "a new reference is far from a moving stem"),
-    Rule(overdue, (), WAITS, "the stem has not rested within the longest time that it takes"),
+    Rule(overdue, (), WAITS, "a rest is overdue"),
 )
 AT_REST: tuple[Rule, ...] = (
     Rule(there, (Idle,), (NOTHING,), "the stem is within the dead band"),
     Rule(as_near_as_slides_land, (Idle,), ENDED, "slides leave no smaller error, or the stem is on its stop"),
-    Rule(one_slide, (Sliding,), CUT_SHORT, "the error is more than the break-away distance"),
+    Rule(one_slide, (Sliding,), CUT_SHORT, "the error exceeds the break-away distance"),
     Rule(preslid, (Presliding,), (InhibitReason.PRESLIDING,), "presliding reaches the reference"),
     Rule(taken_back, (Idle,), (InhibitReason.REFERENCE_COMES,), "coming references will reduce the error"),
     Rule(excursion_waits, (Idle,), (InhibitReason.EXCURSION_WAITS,), "the last excursion was too recent"),
-    Rule(two_slides, (Out,), (NOTHING,), "two slides are left, and no limit bars an excursion"),
-    Rule(day_spent, (Idle,), (InhibitReason.EXCURSION_BUDGET_SPENT,), "what excursions may cost in a day is spent"),
+    Rule(two_slides, (Out,), (NOTHING,), "two slides are left, no limit bars an excursion"),
+    Rule(day_spent, (Idle,), (InhibitReason.EXCURSION_BUDGET_SPENT,), "a day's excursions are spent"),
     Rule(nothing_breaks_loose, (Idle,), (InhibitReason.STUCK,), HELD),
-    Rule(limits_end_it, (Idle,), BARS, "else: no slide is left, or a limit bars it"),
+    Rule(limits_end_it, (Idle,), BARS, "else"),
 )
 TABLE = (*MOVING, *AT_REST)
 
