@@ -6,7 +6,7 @@ may say units.
 """
 
 import re
-from collections import Counter
+from collections import Counter, deque
 from collections.abc import Collection, Iterator, Mapping, Sequence
 from dataclasses import dataclass, field, replace
 from itertools import islice, takewhile
@@ -24,7 +24,7 @@ SEARCHED = 300
 BELOW = 12
 """Rows between the header and the samples at most."""
 SURELY_SAMPLES = 40
-"""Rows under the header by which a clock is told that nobody has named."""
+"""Rows under the header, and at the end, by which a clock is told that nobody has named."""
 SHOWN = 30
 """Names that a message lists at most."""
 
@@ -212,7 +212,8 @@ def _with_stated_unit(header: Header) -> Header:
     lasts_s = stated_duration_s(cells for _, cells in islice(header.table.rows(), max(0, header.line - 1)))
     if not lasts_s > 0.0:
         return header
-    rows = [cells for _, cells in _from(header.table, header.samples_after, None)]
+    samples = (cells for _, cells in _from(header.table, header.samples_after, None))
+    rows = [*islice(samples, SURELY_SAMPLES), *deque(samples, SURELY_SAMPLES)]
     written, told = header.as_written or header.names, dict[str, tuple[str, int]]()
     for name, (first, *_) in header.at.items():
         if name in header.units or (name != header.clock and (header.clock or _is_signal(name))):
