@@ -73,6 +73,16 @@ def test_the_truth_lies_inside_in_nineteen_of_twenty(like: Likelihood, scatter: 
     assert held >= 0.9 * DRAWS, "by samples alone 63 of 100 where the valve scatters, by as many degrees as moves 87"
 
 
+def test_moves_in_a_row_that_share_a_disturbance_are_fewer_witnesses(like: Likelihood) -> None:
+    generator = np.random.default_rng(2)
+    straight = Straight(like, np.ones(like.count))
+    held = 0
+    for _ in range(DRAWS):
+        shared = np.convolve(generator.standard_normal(len(like.moves) + 3), np.ones(3), "valid")
+        held += straight.held(3.0 * shared[like.move_of] + generator.standard_normal(like.count))
+    assert held >= 0.85 * DRAWS, "each of them a witness by itself: 73 of 100"
+
+
 def test_a_combination_names_who_takes_part_in_it_and_by_which_power() -> None:
     """Jacobians that are blind to (0.85, 0.4, 0.33, 0.1): what takes part by a tenth is not worth a word."""
     record = ready(record_of(SLIM, 7, command_pa=to_and_fro()))
@@ -138,4 +148,11 @@ def test_static_friction_takes_on_what_is_open_of_an_excess_at_rest() -> None:
     """A break-away tells F_s + F_x: of an excess lost faster than any sample shows, F_s may be the whole or less."""
     hidden = hide(81026, effects=("stribeck",))
     static = fit(hidden.fit, hidden.base, effects=["stribeck"]).parameters["static_n"]
+    assert static.lower <= hidden.truth.valve.static_n <= static.upper
+
+
+@pytest.mark.parametrize("seed", few_always([52035, 52001, 52018]))
+def test_static_friction_is_not_below_all_that_noise_has_broken_loose_early(seed: int) -> None:
+    hidden = hide(seed, effects=seed % 2, dirty=True)
+    static = fit(hidden.fit, hidden.base, effects=[each.name for each in hidden.truth.effect]).parameters["static_n"]
     assert static.lower <= hidden.truth.valve.static_n <= static.upper

@@ -25,7 +25,7 @@ as that onset,
     r_k / sqrt(1 + (dr_k / do_k)^2 / D_k)     D_k the curvature by the k-th onset
 
 Where break-aways scatter, s^2 = 2 cost / (n - 1) > 1, a force that no record holds breaks the stem loose, which it does
-early alone: the upper end goes up by `early` of its deviations, sqrt(s^2 - 1) L_0.
+early alone: the upper end goes up by `EARLIEST_DEVIATIONS` of its deviations, sqrt(s^2 - 1) L_0.
 
 A combination of parameters whose standard deviation exceeds 1, a factor of e, is not determined.
 """
@@ -53,7 +53,7 @@ FEWEST_FREE = 2.0
 RISE_95 = 1.92
 TOGETHER = 3
 """Moves in a row that one disturbance may outlast: slips of a ramp follow each other in some tenths of a second."""
-EARLY = 2.0
+EARLIEST_DEVIATIONS = 2.0
 """Deviations by which what breaks a stem loose is above its mean: of six independent values the largest is 2.0 of its
 own above theirs (of two 0.7, of twenty 3.6). A stem that is slowly loaded is broken loose by the largest."""
 NOTHING = 1e-12
@@ -253,7 +253,7 @@ def _by_break_aways(like: Likelihood, theta: Vector, path: ToldPath, i: int, wid
     scatter = max(1.0, 2.0 * min(costs) / max(like.broken.size - 1, 1))
     near = np.flatnonzero(costs <= min(costs) + RISE_95 * scatter)
     low, high = float(at[max(near[0] - 1, 0)]), float(at[min(near[-1] + 1, at.size - 1)])  # where it is dearer already
-    early = EARLY * np.sqrt(scatter - 1.0) * like.load_n / static_n[int(np.argmin(costs))]
+    early = EARLIEST_DEVIATIONS * np.sqrt(scatter - 1.0) * like.load_n / static_n[int(np.argmin(costs))]
     return low, float(min(high + np.log1p(early), bounds[1]))
 
 
