@@ -6,7 +6,8 @@ of each step, dead band and resolution of the recording. A figure that cannot be
     response_figures                the whole recording
     response_result                 what it gives, and how that shows itself: sentences, table, figure, data frame
     step_detection, step_figures    its steps, and the figures of one
-    rest_level, figure              where the stem rests; a figure with its uncertainty, and when a level is crossed
+    rest_level, level_crossing      where the stem rests, and when it crosses a level
+    figure                          a figure with its uncertainty, or why there is none
     measured_dead_band              dead band and resolution, from series of small steps
 """
 

@@ -23,7 +23,8 @@ import numpy as np
 
 from config.recording import Column
 from config.results.result import Brief
-from positioner.response.figure import Figure, LevelCrossing, level_crossing, no_value
+from positioner.response.figure import Figure, no_value
+from positioner.response.level_crossing import LevelCrossing, level_crossing
 from positioner.response.rest_level import RestLevel, rest_at_the_end
 from positioner.response.step_detection import StepChange
 

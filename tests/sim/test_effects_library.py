@@ -14,7 +14,7 @@ from sim.effects.__main__ import renew_catalogue
 from sim.open_loop import respond
 from sim.valve import Valve
 from tests.sim.library import EFFECTS, SEED, Series, library, plain, theta_with
-from workbench.model.parameters import MOST_GRID
+from workbench.model.search_coordinates import MOST_GRID
 
 PATH = (
     "ip_lag dead_time rate_limit supply_limit",

@@ -19,7 +19,7 @@ from workbench.diagnosis.verdict_sentence import reduction_sentence
 from workbench.fit.fit_result import Known, Term
 from workbench.fit.fitting import base_fit
 from workbench.fit.problem import problem
-from workbench.model.parameters import Parameter
+from workbench.model.search_coordinates import Parameter
 from workbench.model.told_run import told_moves
 from workbench.select.block_errors import block_errors, block_logs, indistinguishable, relative_error_reduction
 from workbench.select.effect_acceptance import LEAST_BIC, LEAST_HELD_OUT, Gain, evidence_for, gain

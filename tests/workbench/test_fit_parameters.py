@@ -13,7 +13,7 @@ from sim.composition import Composition
 from sim.effect import shipped_effect
 from tests.workbench.valves import SEED, drawn_valve, error_of, record_of, with_effect
 from workbench.fit.fitting import fit
-from workbench.model.parameters import free_parameters
+from workbench.model.search_coordinates import free_parameters
 
 DATA = Path(__file__).parents[3] / "shared" / "data" / "servo_motor"
 

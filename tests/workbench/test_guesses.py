@@ -9,7 +9,7 @@ from tests.workbench.valves import NOISE_M, drawn_valve, pressures, record_of, w
 from workbench.data.record import ready
 from workbench.fit.fitting import fit
 from workbench.fit.guesses import guessed_values, likely_delays_s, likely_quanta_m
-from workbench.model.parameters import free_parameters
+from workbench.model.search_coordinates import free_parameters
 
 VALVE = drawn_valve(np.random.default_rng(0))
 PER_M_PA = VALVE.valve.spring_n_per_m / VALVE.valve.diaphragm_area_m2

@@ -5,8 +5,8 @@ import pytest
 
 from config.recording import Recording
 from workbench.data.held_out import split
+from workbench.data.informative_rows import eventful
 from workbench.data.record import SLIP_ROWS, ready
-from workbench.data.stillness import eventful
 from workbench.data.stretches import FITTED_WORK, STRETCHES, informative
 
 NOISE_M, HELD = 5e-5, 60

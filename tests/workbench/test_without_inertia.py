@@ -9,9 +9,9 @@ from signals.moves import rests
 from sim.composition import Composition
 from tests.workbench.slow_records import SPAN_PA, once_a_second
 from tests.workbench.valves import NOISE_M, SEED, with_effect
+from workbench.data.informative_rows import eventful
 from workbench.data.noise_floor import with_noise
 from workbench.data.record import ready
-from workbench.data.stillness import eventful
 from workbench.fit.fitting import fit
 from workbench.model.free_run import FreeRun
 from workbench.model.simulation_regime import DYNAMIC, Motion, landings, sampling

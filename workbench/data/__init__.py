@@ -8,7 +8,7 @@ Its files:
     noise_floor       what no model explains: noise, rounding, how well the valve repeats itself
     pressure_lag      the lag of a measured pressure, and what it was where it was not measured
     motion            velocity and acceleration
-    stillness         which rows tell something, and which only say it again
+    informative_rows  which rows tell something, and which only say it again
     stretches         of a long one, those that tell the most
     kept_results      results kept in a folder by the content of what they are of
     imposed_motion    a bench where a rig imposes the position, and static curves

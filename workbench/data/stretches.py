@@ -1,6 +1,6 @@
 """Of a long recording, the stretches that are fitted: spread over its time, in each part those that tell the most.
 
-    work = rows that tell something + 20 slips        what a simulation costs (`stillness`, `motion`)
+    work = rows that tell something + 20 slips        what a simulation costs (`informative_rows`, `motion`)
 
 A recording whose work is no more than `FITTED_WORK` is fitted whole. A longer one is divided into `STRETCHES` of
 equally many rows. In each the unbroken stretch is taken in which the stem travels the farthest, of those that cost no
@@ -16,8 +16,8 @@ import numpy as np
 
 from config.recording import Recording
 from signals.moves import slips
+from workbench.data.informative_rows import eventful
 from workbench.data.record import SLIP_ROWS, STRETCH, Record, ready
-from workbench.data.stillness import eventful
 
 FITTED_WORK = 40_000
 """Of what is fitted and held out together."""

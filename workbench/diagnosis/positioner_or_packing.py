@@ -31,7 +31,7 @@ from sim.effect import find_effect
 from workbench.data.held_out import Split
 from workbench.fit.fit_result import Fit
 from workbench.fit.fitting import fit
-from workbench.model.parameters import BEHIND_POSITIONER as FREE
+from workbench.model.search_coordinates import BEHIND_POSITIONER as FREE
 from workbench.select.block_errors import block_errors
 from workbench.select.effect_acceptance import LEAST_BIC, Gain, gain
 from workbench.select.effect_candidates import EvaluatedModel

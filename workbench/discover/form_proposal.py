@@ -20,7 +20,7 @@ from sim.effect import Effect
 from workbench.fit.fit_result import Fit
 from workbench.fit.problem import Problem
 from workbench.fit.threads import on_threads
-from workbench.model.parameters import MOST_GRID
+from workbench.model.search_coordinates import MOST_GRID
 from workbench.select.tangent_preview import Left
 
 BEST = 2

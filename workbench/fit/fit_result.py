@@ -26,7 +26,7 @@ from workbench.fit.minimiser import End
 from workbench.fit.problem import Problem
 from workbench.fit.uncertainty import RISE_95, Combination, Uncertainty, uncertainty
 from workbench.model.free_run import FreeRun
-from workbench.model.parameters import Parameter
+from workbench.model.search_coordinates import Parameter
 from workbench.model.simulation_regime import DYNAMIC, Sampling
 
 if TYPE_CHECKING:

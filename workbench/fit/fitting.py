@@ -36,7 +36,7 @@ from workbench.fit.starts import (
     with_strengths,
 )
 from workbench.fit.threads import linear_algebra_alone, on_threads
-from workbench.model.parameters import DEFAULT
+from workbench.model.search_coordinates import DEFAULT
 from workbench.model.simulation_regime import DYNAMIC, MOST_WITH_INERTIA, Motion, Sampling
 from workbench.model.told_run import told_moves
 

@@ -18,7 +18,7 @@ from scipy.optimize import minimize_scalar
 from config.recording import Column
 from signals.moves import moves, rests
 from workbench.data.record import Record
-from workbench.model.parameters import Parameter
+from workbench.model.search_coordinates import Parameter
 
 ENDS, INSIDE, ASIDE = (0.002, 0.998), (1.0, 4.0, 16.0), 0.1
 """Quantiles of the positions at their ends; how far inside these, in noises; how far outside, of what is swept."""

@@ -30,7 +30,7 @@ import numpy.typing as npt
 from sim.composition import COULOMB, STATIC, Composition
 from sim.karnopp import Vector
 from workbench.data.record import Record
-from workbench.model.parameters import Parameter
+from workbench.model.search_coordinates import Parameter
 from workbench.model.simulation_regime import Sampling
 from workbench.model.told_run import RECORDS, ToldMove, ToldPath, ToldRun
 

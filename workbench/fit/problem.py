@@ -9,7 +9,7 @@ from sim.composition import BASE, SPRING, Composition
 from sim.effect import Effect
 from workbench.data.record import Record, require_units
 from workbench.fit.likelihood import WEIGHTS, Likelihood
-from workbench.model.parameters import AT_REST, BEHIND_POSITIONER, DEFAULT, LANDED, Parameter, free_parameters
+from workbench.model.search_coordinates import AT_REST, BEHIND_POSITIONER, DEFAULT, LANDED, Parameter, free_parameters
 from workbench.model.simulation_regime import NO_LANDING, Motion, Sampling, sampling
 from workbench.model.told_run import ToldMove, told_moves
 
@@ -55,7 +55,7 @@ class Problem:
         Args:
             composition: the valve.
             free: names of parameters.
-            scale: as of `workbench.model.parameters.free_parameters`.
+            scale: as of `workbench.model.search_coordinates.free_parameters`.
             known: the same.
 
         Raises:

@@ -14,7 +14,7 @@ from sim.karnopp import Vector
 from workbench.fit.guesses import guessed_values
 from workbench.fit.likelihood import Groups, Likelihood, with_static
 from workbench.fit.minimiser import SEARCH
-from workbench.model.parameters import Parameter, strengths
+from workbench.model.search_coordinates import Parameter, strengths
 
 OTHER_FRICTION = (0.5, 2.0)
 """Of the data sheet's, where its own leads to no end at the noise: what an engineer may be off by."""

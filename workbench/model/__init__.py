@@ -10,5 +10,5 @@ Its files:
     simulation_regime         with inertia, without, or landing by landing: by how far apart the samples are
     command_between_samples   whether the command changed between them, by where slides end
     pressure_between_samples  what the measured pressure is between them
-    parameters                the coordinates of a fit
+    search_coordinates        the coordinates of a fit
 """

@@ -2,10 +2,10 @@
 
 A measured pressure goes in straight lines from part to part of a period, as `pressure_between_samples` has it; where
 each rest is judged by itself it is the one at the period's end. Rows in which nothing happens are passed over
-(`stillness`): between a command long held and the next one, with the measured stem at rest, only some are simulated and
-judged. Where the command changed between samples, that of a period is the one at its end, the measured positions say
-which way the stem went, and only rests that a slide ended in are judged. Behind a positioner a period is cut into
-steps, for it feeds back on the pressure meanwhile, and all rows are judged.
+(`informative_rows`): between a command long held and the next one, with the measured stem at rest, only some are
+simulated and judged. Where the command changed between samples, that of a period is the one at its end, the measured
+positions say which way the stem went, and only rests that a slide ended in are judged. Behind a positioner a period is
+cut into steps, for it feeds back on the pressure meanwhile, and all rows are judged.
 """
 
 from collections.abc import Sequence
@@ -21,9 +21,9 @@ from sim.composition import AREA, SPRING, Composition
 from sim.karnopp import Vector
 from sim.open_loop import check_commands, check_periods
 from sim.quasi_static import ALONG, FED_BACK, FREE
+from workbench.data.informative_rows import eventful
 from workbench.data.pressure_lag import command_followed_pa, pressure_lag_s
 from workbench.data.record import Mask, Record
-from workbench.data.stillness import eventful
 from workbench.model.initial_state import BeforeStart, InitialState, before_start, initial_state
 from workbench.model.lead import Lead
 from workbench.model.pressure_between_samples import ends_of_parts_pa

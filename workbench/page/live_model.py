@@ -1,8 +1,8 @@
 """A valve against a recording, its parameters moved by hand: the whole model runs anew at each move, in milliseconds.
 
-A parameter is moved in the coordinate of a fit (`workbench.model.parameters`). A slider's way is what such a valve may
-be: a tenth to ten times a parameter of the valve on the desk, up to four times the strongest that an effect's file
-begins a search with. A number that is typed may lie wherever it is physical.
+A parameter is moved in the coordinate of a fit (`workbench.model.search_coordinates`). A slider's way is what such a
+valve may be: a tenth to ten times a parameter of the valve on the desk, up to four times the strongest that an effect's
+file begins a search with. A number that is typed may lie wherever it is physical.
 
 An effect that is switched off has the parameters with which it vanishes; nothing is compiled.
 """
@@ -23,7 +23,7 @@ from workbench.compare.friction_balance import Forces, forces, join_forces
 from workbench.compare.measures import rms, valid_rows
 from workbench.data.record import Record, require_units
 from workbench.model.free_run import FreeRun, Run
-from workbench.model.parameters import Parameter, free_parameters
+from workbench.model.search_coordinates import Parameter, free_parameters
 
 SLIDER_FACTOR = 10.0
 """A parameter of the bare valve: slider from this part of the valve file's value to this many times it."""

@@ -11,7 +11,7 @@ from webpage.messages import errors_told, heading
 from webpage.number_field import NumberField
 from webpage.units import Units
 from workbench.fit.fitted_parameter import Fitted
-from workbench.model.parameters import Parameter
+from workbench.model.search_coordinates import Parameter
 from workbench.page.explained_words import about_effect, explain_text
 from workbench.page.live_model import LiveModel
 from workbench.report.display_units import parameter as in_words
