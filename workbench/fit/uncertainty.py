@@ -206,10 +206,11 @@ def _about(like: Likelihood, end: End) -> tuple[Curvature, Vector, Vector]:
     std, lower, upper = about.std.copy(), end.z - about.reach, end.z + about.reach
     for i, each in enumerate(like.parameters):
         if each.index == STATIC:
-            low, high = _static_interval(like, end, i, about)
-            std[i] = max(std[i] if std[i] < UNDETERMINED else 0.0, 0.25 * (high - low))
+            low, high, early = _static_interval(like, end, i, about)
+            std[i] = max(std[i] if std[i] < UNDETERMINED else 0.0, 0.25 * (high + early - low))
             by_curvature = NORMAL_QUANTILE * std[i]
-            lower[i], upper[i] = min(low, end.z[i] - by_curvature), max(high, end.z[i] + by_curvature)
+            highest = min(high + EARLIEST_DEVIATIONS * early, each.bounds[1])
+            lower[i], upper[i] = min(low, end.z[i] - by_curvature), max(highest, end.z[i] + by_curvature)
     return replace(about, std=std), lower, upper
 
 
@@ -222,14 +223,17 @@ def _root(covariance: Vector, std: Vector) -> Vector:
     return np.asarray((vectors / np.sqrt(np.maximum(values, NOTHING))).T / np.maximum(std, NOTHING))
 
 
-def _static_interval(like: Likelihood, end: End, i: int, about: Curvature) -> tuple[float, float]:
-    """Return the interval of the i-th coordinate, static friction, by break-aways and what others change of it."""
+def _static_interval(like: Likelihood, end: End, i: int, about: Curvature) -> tuple[float, float, float]:
+    """Return the interval of the i-th coordinate, static friction, by break-aways and what others change of it.
+
+    And the deviation of what breaks the stem loose early.
+    """
     theta = like.theta(end.z)
     path, later = (like.run.run(theta, end.onsets_s + shift * like.run.period_s) for shift in (0.0, SHIFT))
     gains = np.nan_to_num((later.breaks_n - path.breaks_n) / SHIFT / like.load_n)
     by_onset = np.diag(about.information)[end.z.size :]
     wider = np.hypot(1.0, gains / np.sqrt(np.maximum(by_onset, FARTHEST**-2.0)))[like.broken]
-    low, high = _by_break_aways(like, theta, path, i, wider)
+    low, high, early = _by_break_aways(like, theta, path, i, wider)
     others = np.delete(np.arange(end.z.size), i)
     values, vectors = np.linalg.eigh(about.covariance[np.ix_(others, others)])
     bounds, below, above = np.array([each.bounds for each in like.parameters]), 0.0, 0.0
@@ -238,13 +242,18 @@ def _static_interval(like: Likelihood, end: End, i: int, about: Curvature) -> tu
         for step in (-way, way):
             there = like.theta(np.clip(end.z + np.insert(step, i, 0.0), *bounds.T))
             found.append(_by_break_aways(like, there, like.run.run(there, end.onsets_s), i, wider))
-        below += max(0.0, *(low - lowest for lowest, _ in found)) ** 2
-        above += max(0.0, *(highest - high for _, highest in found)) ** 2
-    return max(low - below**0.5, float(bounds[i, 0])), min(high + above**0.5, float(bounds[i, 1]))
+        below += max(0.0, *(low - lowest for lowest, _, _ in found)) ** 2
+        above += max(0.0, *(highest - high for _, highest, _ in found)) ** 2
+    return max(low - below**0.5, float(bounds[i, 0])), min(high + above**0.5, float(bounds[i, 1])), early
 
 
-def _by_break_aways(like: Likelihood, theta: Vector, path: ToldPath, i: int, wider: Vector) -> tuple[float, float]:
-    """Return between which values of the i-th coordinate break-aways cost no more than 1.92 above the least."""
+def _by_break_aways(
+    like: Likelihood, theta: Vector, path: ToldPath, i: int, wider: Vector
+) -> tuple[float, float, float]:
+    """Return between which values of the i-th coordinate break-aways cost no more than 1.92 above the least.
+
+    And the deviation, as of that coordinate, by which what breaks the stem loose scatters beyond what a record holds.
+    """
     bounds, z = like.parameters[i].bounds, like.parameters[i].coordinate(theta)
     reach = np.concatenate([-np.geomspace(1.0, 1e-4, 200), [0.0], np.geomspace(1e-4, 1.0, 200)])
     at = np.unique(np.clip(z + reach, *bounds))
@@ -253,8 +262,8 @@ def _by_break_aways(like: Likelihood, theta: Vector, path: ToldPath, i: int, wid
     scatter = max(1.0, 2.0 * min(costs) / max(like.broken.size - 1, 1))
     near = np.flatnonzero(costs <= min(costs) + RISE_95 * scatter)
     low, high = float(at[max(near[0] - 1, 0)]), float(at[min(near[-1] + 1, at.size - 1)])  # where it is dearer already
-    early = EARLIEST_DEVIATIONS * np.sqrt(scatter - 1.0) * like.load_n / static_n[int(np.argmin(costs))]
-    return low, float(min(high + np.log1p(early), bounds[1]))
+    early = np.sqrt(scatter - 1.0) * like.load_n / static_n[int(np.argmin(costs))]
+    return low, high, float(np.log1p(early))
 
 
 def _open_combinations(like: Likelihood, H: Vector) -> tuple[Combination, ...]:
