@@ -3,7 +3,7 @@
     H = J' W^3 J + 1 / f^2   J the residuals by coordinates z and onsets, W = 1 / sqrt(1 + (r / s)^2): the
                              soft L1 has the slope W r and the curvature W^3; f = `FARTHEST`, the deviation of what
                              no residual hangs on
-    C = H^-1, but no less in any coordinate than (n - 1) / n sum_k d_k^2, nor than (n - 1) / n sum_k e_k^2 / b
+    C = H^-1, but no less in any coordinate than (n - 1) / n sum_k d_k^2, and of an interval (n - 1) / n sum_k e_k^2 / b
     d_k = (A - A_k)^-1 g_k   by how much the coordinates move without the k-th of n moves and the rest that it ends in;
                              A = sum_k A_k curvature by coordinates, onsets eliminated, g_k = J_k' W_k r_k
     e_k = d_k + ... + d_(k + b - 1)     the same of b = `TOGETHER` moves in a row
@@ -119,6 +119,10 @@ class Curvature:
     """Newton's step -C J' W r, in deviations, (parameters,): 0 but where a bound holds a coordinate."""
     reach: Vector
     """Half of the interval of 95 %, (parameters,); infinite where no residual hangs on a coordinate."""
+    shared: Vector
+    """Factor on that where moves in a row share what disturbs them, (parameters,)."""
+    early: Vector
+    """Deviation of what breaks the stem loose early, of static friction, else 0, (parameters,)."""
 
 
 def _curvature(like: Likelihood, end: End) -> Curvature:
@@ -134,22 +138,24 @@ def _curvature(like: Likelihood, end: End) -> Curvature:
     values = np.maximum(values, NOTHING * values[-1])
     inverse = (vectors / values) @ vectors.T
     without, free = _without_each_move(like, scaled, weight, r, count, (FARTHEST * scale[:count]) ** -2.0)
-    moves = len(without)
-    apart = (moves - 1.0) / moves * _square_sum(without)
-    own = np.diag(inverse)[:count]
+    own, apart, together = np.diag(inverse)[:count], _variance(without, 1), _variance(without, TOGETHER)
     std = np.minimum(np.sqrt(np.maximum(own, apart)) / scale[:count], FARTHEST)
     reach = np.where(apart > own, stdtrit(np.maximum(free, FEWEST_FREE), PROBABILITY), NORMAL_QUANTILE) * std
+    alone = np.maximum(own, apart)
+    shared = np.sqrt(np.maximum(together, alone) / alone)
     reach[lengths[:count] == 0.0] = np.inf
     off = -(inverse @ (scaled.T @ (weight * r)) / scale)[:count] / std
     by = np.outer(scale, scale)
-    return Curvature(H * by, inverse / by, float(np.sqrt(values[-1] / values[0])), std, off, reach)
+    return Curvature(
+        H * by, inverse / by, float(np.sqrt(values[-1] / values[0])), std, off, reach, shared, np.zeros(count)
+    )
 
 
-def _square_sum(d: Vector) -> Vector:
-    """Return sum_k d_k^2 of each column, or by what TOGETHER moves in a row do as one, whichever is more."""
+def _variance(d: Vector, together: int) -> Vector:
+    """Return what the jackknife by so many moves in a row, each of n without one by d, (n, columns), comes to."""
     sums = np.cumsum(np.vstack([np.zeros((1, d.shape[1])), d]), axis=0)
-    rows = sums[TOGETHER:] - sums[:-TOGETHER]
-    return np.asarray(np.maximum(np.sum(d**2, axis=0), np.sum(rows**2, axis=0) / TOGETHER))
+    e, moves = sums[together:] - sums[:-together], len(d)
+    return np.asarray((moves - 1.0) / moves * np.sum(e**2, axis=0) / together)
 
 
 def _without_each_move(
@@ -197,21 +203,26 @@ def uncertainty(like: Likelihood, end: End) -> Uncertainty:
     std = np.maximum(about.std, np.minimum((upper - lower) / (2.0 * NORMAL_QUANTILE), FARTHEST))
     open_ones = _open_combinations(like, about.information[:count, :count])
     root = _root(about.covariance[:count, :count], std)
+    # What disturbs a record widens what is said of the truth; where to search, and what held-out moves may ask, it is
+    # within the deviations.
+    lower, upper = end.z - about.shared * (end.z - lower), end.z + about.shared * (upper - end.z)
+    upper = upper + (EARLIEST_DEVIATIONS - 1.0) * about.early
     return Uncertainty(std, lower, upper, about.condition, open_ones, about.off, root)
 
 
 def _about(like: Likelihood, end: End) -> tuple[Curvature, Vector, Vector]:
     """Return what the likelihood is like about an end, and between which coordinates 95 % lie there."""
     about = _curvature(like, end)
-    std, lower, upper = about.std.copy(), end.z - about.reach, end.z + about.reach
+    std, lower, upper, early = about.std.copy(), end.z - about.reach, end.z + about.reach, about.early.copy()
+    shared = about.shared.copy()
     for i, each in enumerate(like.parameters):
         if each.index == STATIC:
-            low, high, early = _static_interval(like, end, i, about)
-            std[i] = max(std[i] if std[i] < UNDETERMINED else 0.0, 0.25 * (high + early - low))
+            low, high, early[i] = _static_interval(like, end, i, about)
+            high = min(high + early[i], each.bounds[1])
+            std[i] = max(std[i] if std[i] < UNDETERMINED else 0.0, 0.25 * (high - low))
             by_curvature = NORMAL_QUANTILE * std[i]
-            highest = min(high + EARLIEST_DEVIATIONS * early, each.bounds[1])
-            lower[i], upper[i] = min(low, end.z[i] - by_curvature), max(highest, end.z[i] + by_curvature)
-    return replace(about, std=std), lower, upper
+            lower[i], upper[i], shared[i] = min(low, end.z[i] - by_curvature), max(high, end.z[i] + by_curvature), 1.0
+    return replace(about, std=std, early=early, shared=shared), lower, upper
 
 
 def _root(covariance: Vector, std: Vector) -> Vector:
