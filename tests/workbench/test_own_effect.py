@@ -104,3 +104,14 @@ def test_an_effect_by_its_path_is_a_program_run_only_from_folders_allowed(
     for source in ("valve.toml", "valve.toml", "valve file"):
         assert find_effect(str(ran), source).name == "odd"
     assert caplog.messages == [f"valve.toml names an effect by its path: {ran} is run as a program"]
+
+
+def test_a_play_that_declares_no_start_is_searched_from_where_it_does_nothing(tmp_path: Path) -> None:
+    shipped = find_effect("backlash", "shipped effects").path.read_text(encoding="utf-8")
+    play = tmp_path / "own_play.py"
+    play.write_text(re.sub(r" starts=\(.*?\),", "", shipped), encoding="utf-8")
+    recording = record_of(BARE, 5, COUNT)
+    base = fit(recording, BARE)
+    found = fit(recording, BARE, effects=(str(play),), base=base)
+    assert "own_play.width_m" in found.parameters
+    assert found.cost <= base.cost + 0.5, "no effect makes a valve worse"

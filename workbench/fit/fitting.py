@@ -218,7 +218,7 @@ def glimpse(
             begins = starts_by_landings(like, added, fitted, Origin(sheet), points)
             searches += [lambda z=z: _from_afar(like, z, GLIMPSE, chosen) for z in begins]  # type: ignore[misc]
     ends = list(on_threads(lambda search: search(), searches, workers))
-    if like.cost(without.whole) < _cheapest(ends).cost:
+    if like.cost(without.whole) < min((each.cost for each in ends), default=inf):  # an own effect may declare no start
         ends.append(descend(like, off, base.onsets_s, GLIMPSE))
     best = _cheapest(ends)
     other_order = in_other_order(like, best.z)
