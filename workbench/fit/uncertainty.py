@@ -121,8 +121,6 @@ class Curvature:
     """Half of the interval of 95 %, (parameters,); infinite where no residual hangs on a coordinate."""
     shared: Vector
     """Factor on that where moves in a row share what disturbs them, (parameters,)."""
-    early: Vector
-    """Deviation of what breaks the stem loose early, of static friction, else 0, (parameters,)."""
 
 
 def _curvature(like: Likelihood, end: End) -> Curvature:
@@ -146,9 +144,8 @@ def _curvature(like: Likelihood, end: End) -> Curvature:
     reach[lengths[:count] == 0.0] = np.inf
     off = -(inverse @ (scaled.T @ (weight * r)) / scale)[:count] / std
     by = np.outer(scale, scale)
-    return Curvature(
-        H * by, inverse / by, float(np.sqrt(values[-1] / values[0])), std, off, reach, shared, np.zeros(count)
-    )
+    condition = float(np.sqrt(values[-1] / values[0]))
+    return Curvature(H * by, inverse / by, condition, std, off, reach, shared)
 
 
 def _variance(d: Vector, together: int) -> Vector:
@@ -191,30 +188,48 @@ def _without_each_move(
     return (without @ g[:, :, None])[:, :, 0], free
 
 
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Interval:
+    """Between which coordinates 95 % lie, each (parameters,); what disturbs a record takes the truth farther."""
+
+    lower: Vector
+    upper: Vector
+    shared: Vector
+    """As of `Curvature`; 1 of static friction."""
+    early: Vector
+    """Deviation of what breaks the stem loose early, in `upper` once; 0 of all but static friction."""
+
+    def of_truth(self, z: Vector) -> tuple[Vector, Vector]:
+        """Return the ends within which the truth lies, about coordinates, (parameters,)."""
+        beyond = (EARLIEST_DEVIATIONS - 1.0) * self.early
+        return z - self.shared * (z - self.lower), z + self.shared * (self.upper - z) + beyond
+
+
 def uncertainty(like: Likelihood, end: End) -> Uncertainty:
-    """Judge where a search stays; its Jacobian must be there."""
+    """Judge where a search stays; its Jacobian must be there.
+
+    Where to search, and what held-out moves may ask, it is within the deviations alone.
+    """
     count = len(like.parameters)
-    about, lower, upper = _about(like, end)
+    about, own = _about(like, end)
+    lower, upper = own.lower, own.upper
     for other in end.as_likely:
-        _, lowest, highest = _about(like, other)
+        _, there = _about(like, other)
         share = np.sqrt(1.0 - (other.cost - end.cost) / RISE_95)
-        lower = np.minimum(lower, other.z - share * (other.z - lowest))
-        upper = np.maximum(upper, other.z + share * (highest - other.z))
+        lower = np.minimum(lower, other.z - share * (other.z - there.lower))
+        upper = np.maximum(upper, other.z + share * (there.upper - other.z))
     std = np.maximum(about.std, np.minimum((upper - lower) / (2.0 * NORMAL_QUANTILE), FARTHEST))
     open_ones = _open_combinations(like, about.information[:count, :count])
     root = _root(about.covariance[:count, :count], std)
-    # What disturbs a record widens what is said of the truth; where to search, and what held-out moves may ask, it is
-    # within the deviations.
-    lower, upper = end.z - about.shared * (end.z - lower), end.z + about.shared * (upper - end.z)
-    upper = upper + (EARLIEST_DEVIATIONS - 1.0) * about.early
-    return Uncertainty(std, lower, upper, about.condition, open_ones, about.off, root)
+    farther = replace(own, lower=lower, upper=upper).of_truth(end.z)
+    return Uncertainty(std, *farther, about.condition, open_ones, about.off, root)
 
 
-def _about(like: Likelihood, end: End) -> tuple[Curvature, Vector, Vector]:
+def _about(like: Likelihood, end: End) -> tuple[Curvature, Interval]:
     """Return what the likelihood is like about an end, and between which coordinates 95 % lie there."""
     about = _curvature(like, end)
-    std, lower, upper, early = about.std.copy(), end.z - about.reach, end.z + about.reach, about.early.copy()
-    shared = about.shared.copy()
+    std, lower, upper = about.std.copy(), end.z - about.reach, end.z + about.reach
+    shared, early = about.shared.copy(), np.zeros(end.z.size)
     for i, each in enumerate(like.parameters):
         if each.index == STATIC:
             low, high, early[i] = _static_interval(like, end, i, about)
@@ -222,7 +237,7 @@ def _about(like: Likelihood, end: End) -> tuple[Curvature, Vector, Vector]:
             std[i] = max(std[i] if std[i] < UNDETERMINED else 0.0, 0.25 * (high - low))
             by_curvature = NORMAL_QUANTILE * std[i]
             lower[i], upper[i], shared[i] = min(low, end.z[i] - by_curvature), max(high, end.z[i] + by_curvature), 1.0
-    return replace(about, std=std, early=early, shared=shared), lower, upper
+    return replace(about, std=std), Interval(lower=lower, upper=upper, shared=shared, early=early)
 
 
 def _root(covariance: Vector, std: Vector) -> Vector:

@@ -8,7 +8,7 @@ import shlex
 from collections import Counter
 from collections.abc import Iterator, Sequence
 from dataclasses import dataclass, field, replace
-from math import inf, isnan
+from math import inf
 
 import numpy as np
 import numpy.typing as npt
@@ -135,7 +135,7 @@ def _span_s(clock: ColumnPreview) -> float:
             base = time_base(values)
             return abs(float(values[-1] - values[0])) * UNITS["_s"][base.unit if base else clock.unit or "s"]
     lasts_s = duration_s([str(cell) for cell in cells])
-    return inf if isnan(lasts_s) else lasts_s
+    return inf if lasts_s is None else lasts_s
 
 
 def _shares(mapped: Sequence[str], open_: list[str]) -> list[str]:

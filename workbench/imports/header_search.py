@@ -210,7 +210,7 @@ def with_units(header: Header) -> Header:
 def _with_stated_unit(header: Header) -> Header:
     """Return the header with the unit of its clocks by the begin and the end that stand above it."""
     lasts_s = stated_duration_s(cells for _, cells in islice(header.table.rows(), max(0, header.line - 1)))
-    if not lasts_s > 0.0:
+    if not lasts_s:  # not told, or begin and end are one
         return header
     samples = (cells for _, cells in _from(header.table, header.samples_after, None))
     rows = [*islice(samples, SURELY_SAMPLES), *deque(samples, SURELY_SAMPLES)]

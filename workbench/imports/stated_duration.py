@@ -22,8 +22,8 @@ DURATION_TOLERANCE = 0.1
 """Of the duration: stamps in whole seconds and a last step are less, and units lie apart by ten and more."""
 
 
-def stated_duration_s(above: Iterable[Sequence[Cell]]) -> float:
-    """Return how long a recording lasts by the rows above its names, s; NaN where they do not say.
+def stated_duration_s(above: Iterable[Sequence[Cell]]) -> float | None:
+    """Return how long a recording lasts by the rows above its names, s; None where they do not say.
 
     >>> stated_duration_s([["StartTime", "05.03.2026 08:15:00"], ["EndTime", "05.03.2026 08:20:00"]])
     300.0
@@ -33,7 +33,7 @@ def stated_duration_s(above: Iterable[Sequence[Cell]]) -> float:
         label, *stamp = [str(cell) for cell in row if cell != ""] or [""]
         if stamp and len(stamps) < 2 and re.search((BEGIN, END)[len(stamps)], label, re.IGNORECASE):
             stamps.append(" ".join(stamp))
-    return duration_s(stamps) if len(stamps) == 2 else float("nan")
+    return duration_s(stamps) if len(stamps) == 2 else None
 
 
 def unit_by_duration(columns: Iterable[Sequence[Cell]], separator: str, lasts_s: float) -> str | None:

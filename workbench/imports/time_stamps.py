@@ -83,13 +83,13 @@ def seconds_of(
     return stamps - stamps[0], float(stamps[0]), naive
 
 
-def duration_s(texts: Sequence[str]) -> float:
-    """Return the seconds from the first of some stamps to the last; NaN where they cannot be read."""
+def duration_s(texts: Sequence[str]) -> float | None:
+    """Return the seconds from the first of some stamps to the last; None where they cannot be read."""
     time_format = next(iter(propose_formats(texts)), None)
     try:
         return abs(float(seconds_of(Path(), texts, range(len(texts)), time_format)[0][-1]))
     except InputError:
-        return float("nan")
+        return None
 
 
 def _swap_day_and_month(time_format: str) -> str:
