@@ -9,7 +9,7 @@ do not take back (`reference_course.py`).
 
 from dataclasses import dataclass, replace
 from operator import is_
-from typing import ClassVar, Self
+from typing import ClassVar, NamedTuple, Self
 
 from config.codes import InhibitReason
 from config.daemon_file import DaemonFile
@@ -25,6 +25,7 @@ from positioner.control.laws.slides.transitions import after
 from positioner.control.valve_knowledge import ValveKnowledge
 from positioner.estimation.acceptance import Ratios
 from positioner.estimation.landings.static_identification import StaticIdentification
+from positioner.estimation.landings.stem_at_rest import Rest
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -63,6 +64,8 @@ class SlideLaw:
     memory: SlideMemory
     balance: Balance | None = None
     """By which it last commanded."""
+    planned: "Planned | None" = None
+    """By what it last found nothing to do, whatever the time; None: it plans at each sample."""
 
     @property
     def command_pa(self) -> float:
@@ -76,17 +79,20 @@ class SlideLaw:
 
     def observe(self, seen: Seen) -> "SlideLaw":
         """Return the law after one sample."""
-        memory, settings, balance = self.memory, self.settings, self.balance
+        memory, settings, balance, planned = self.memory, self.settings, self.balance, self.planned
         if seen.dead_band_m != settings.dead_band_m:
             settings = replace(settings, dead_band_m=seen.dead_band_m)
         if seen.ratios is None:
-            memory = let_go(memory, seen.command_pa, settings)
+            memory, planned = let_go(memory, seen.command_pa, settings), None
         elif seen.usable:
             balance = balance_after(balance, seen.ratios, seen, settings.stroke_m)
-            memory = stepped(memory, Now.of(seen, balance, settings))
-        if memory is self.memory and settings is self.settings and balance is self.balance:
+            planned, stands = planned_by(seen, balance, settings), memory.stands(seen.sample.now_s, settings)
+            if planned is None or planned != self.planned or not stands:
+                memory = stepped(memory, Now.of(seen, balance, settings))
+            planned = planned if stands and memory is self.memory else None
+        if memory is self.memory and settings is self.settings and balance is self.balance and planned == self.planned:
             return self
-        return SlideLaw(settings, memory, balance)
+        return SlideLaw(settings, memory, balance, planned)
 
     def interrupted_pa(self, command_pa: float) -> float:
         """Return what to hold if something interrupts it after a command, Pa: of two slides the second."""
@@ -100,6 +106,24 @@ class SlideLaw:
     def restored(self, knowledge: ValveKnowledge, /) -> "SlideLaw":
         """Return the law with the break-away distances of before a restart."""
         return SlideLaw(self.settings, replace(self.memory, distances=knowledge.distances))
+
+
+class Planned(NamedTuple):
+    """What a plan at rest is made by, beside the law's memory and the time."""
+
+    rest: Rest
+    quantum_m: float
+    reference_m: float
+    balance: Balance
+    settings: SlideSettings
+
+
+def planned_by(seen: Seen, balance: Balance, settings: SlideSettings) -> Planned | None:
+    """Return by what the law plans; None where that is not only a rest: the stem moves, or an outcome is known."""
+    detector = seen.statics.detector
+    if detector.rest is None or seen.outcome is not None:
+        return None
+    return Planned(detector.rest, detector.quantum_m, seen.reference_m, balance, settings)
 
 
 def let_go(memory: SlideMemory, command_pa: float, bounds: SlideBounds) -> SlideMemory:

@@ -8,6 +8,13 @@ from positioner.control.laws.slides.slide_bounds import SlideBounds
 from positioner.control.laws.slides.states import WATCHING, Idle, Slide, State, Watching
 from positioner.estimation.landings.breakaway_distance import BreakawayDistance
 
+ENDS_BY_TIME = (
+    InhibitReason.REFERENCE_COMES,
+    InhibitReason.EXCURSION_WAITS,
+    InhibitReason.EXCURSION_BUDGET_SPENT,
+)
+"""Reasons to be idle that no longer hold after some time."""
+
 
 @dataclass(frozen=True, slots=True)
 class Anchor:
@@ -104,6 +111,12 @@ class SlideMemory:
         if isinstance(self.state, Watching) or self.state == Idle():
             return InhibitReason.NOTHING
         return InhibitReason.STUCK if self.stuck_at_m is not None else self.state.reason
+
+    def stands(self, now_s: float, bounds: SlideBounds) -> bool:
+        """Whether a plan that finds nothing to do finds nothing later: no wait, no run of references, no slides back."""
+        waits = isinstance(self.state, Idle) and self.state.reason in ENDS_BY_TIME
+        comes = self.course is not None and not self.course.rests(now_s)
+        return not (waits or comes) and self.move.refilled(now_s, bounds) is self.move
 
     @property
     def stuck_at_m(self) -> float | None:
