@@ -6,7 +6,7 @@
 too, and what is to be refined is left in the memory for `Controller`, which keeps the memory from step to step.
 
 Most of the time a law waits. A decision stands as long as the DCS asks for nothing, monitors and supervision find
-nothing, and the law that sees the sample is the same after it: then only that is worked out.
+nothing, and the law that sees the sample asks for the same after it: then only that is worked out.
 """
 
 from dataclasses import dataclass, replace
@@ -205,10 +205,10 @@ def step(
     """
     now = Now(memory, sample, requests, settings, sample.position_m if usable(sample, settings.limits) else None)
     monitoring, supervision = _supervised(now)
-    if memory.stands_for is requests and _stands(now, monitoring, supervision):
-        return memory._replace(monitoring=monitoring, supervision=supervision), memory.last
+    if memory.stands_for is requests and (law := _law_where_all_stands(now, monitoring, supervision)) is not None:
+        return memory._replace(monitoring=monitoring, supervision=supervision, law=law), memory.last
     after = _decide_anew(now, monitoring, supervision, refinement)
-    if after.last is memory.last and after.law is memory.law and _only_sees(after, requests, settings):
+    if after.last is memory.last and _asks_alike(now, after.law) and _only_sees(after, requests, settings):
         after = after._replace(stands_for=requests)
     return after, after.last
 
@@ -332,20 +332,29 @@ def _only_sees(memory: ControllerMemory, requests: Requests, settings: Settings)
     return follows and direct and not (asked or last.restoration.provisional)
 
 
-def _stands(now: Now, monitoring: MonitorMemory, supervision: SupervisionMemory) -> bool:
-    """Whether the last decision stands: nothing is seen that is new, and the law asks for what it asked for before."""
+def _law_where_all_stands(now: Now, monitoring: MonitorMemory, supervision: SupervisionMemory) -> Law | None:
+    """Return the law after a sample that shows nothing new, where it asks for what it did before; None: not so."""
     memory, sample, last = now.memory, now.sample, now.memory.last
     if supervision.mode is not last.mode or supervision.fault is not NO_FAULT or monitoring.holding is not last.alarms:
-        return False
+        return None
     if now.stem_m is None or _outcome(now) is not None:
-        return False
+        return None
     seen = _seen(now, memory.reference, last.applied.ratios, None, _dead_band_m(now, last.applied))
     by_steps, law = _law(now, memory.law, seen, one_direction=last.one_direction)
-    if by_steps or law is not memory.law or seen.dead_band_m != last.dead_band_m:
-        return False
+    if by_steps or seen.dead_band_m != last.dead_band_m or not _asks_alike(now, law):
+        return None
     at_rest = memory.statics.detector.rest is not None
     memory.identification.look_on(sample.time_s, sample.position_m, sample.pressure_pa, at_rest=at_rest)
-    return True
+    return law
+
+
+def _asks_alike(now: Now, law: Law) -> bool:
+    """Whether a law asks for what the law of the step before did, be it interrupted or not, and for the same reason."""
+    before, wanted_pa = now.memory.law, now.memory.wanted_pa
+    if law is before:
+        return True
+    alike = law.command_pa == before.command_pa and law.inhibit_reason is before.inhibit_reason
+    return alike and law.interrupted_pa(wanted_pa) == before.interrupted_pa(wanted_pa)
 
 
 def _supervised(now: Now) -> tuple[MonitorMemory, SupervisionMemory]:

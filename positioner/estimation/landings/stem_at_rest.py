@@ -33,7 +33,7 @@ nothing is short. A creep of which no sample was seen cannot be judged.
 
 from array import array
 from collections.abc import Callable
-from dataclasses import dataclass, replace
+from dataclasses import dataclass, field, replace
 from math import isfinite, isnan, log, nan, sqrt
 
 import numpy as np
@@ -85,12 +85,17 @@ class Rest:
     """Samples in the mean."""
     came_to_rest_s: float
     """When it was first seen there for good, after the change of the pressure."""
-    short_m: float = 0.0
-    """How far short of its balance it may have stuck."""
+    came_by: tuple[Array, Array] | None = field(default=None, compare=False, repr=False)
+    """Times, s, and positions, m, of the samples until it had come to rest; None of one that creeps."""
     crept_m: float = 0.0
     """How far it has crept towards it since a quarter of the time; it goes on."""
     pressure_pa: float = nan
     """Measured, a mean; NaN: it is not."""
+
+    @property
+    def short_m(self) -> float:
+        """How far short of its balance it may have stuck."""
+        return 0.0 if self.came_by is None else _short_m(*self.came_by)
 
 
 class RestWindow:
@@ -206,7 +211,7 @@ class RestWindow:
             noise_m=noise_m * sqrt(self._each),
             count=late_m.size * self._each,
             came_to_rest_s=float(time_s[first]) if first else 0.0,
-            short_m=_short_m(time_s[: first + 1], position_m[: first + 1]),
+            came_by=(time_s[: first + 1].copy(), position_m[: first + 1].copy()),
             pressure_pa=late_pa,
         )
 

@@ -86,7 +86,9 @@ class SlideLaw:
             memory, planned = let_go(memory, seen.command_pa, settings), None
         elif seen.usable:
             balance = balance_after(balance, seen.ratios, seen, settings.stroke_m)
-            planned, stands = planned_by(seen, balance, settings), memory.stands(seen.sample.now_s, settings)
+            rest, quantum_m = seen.statics.detector.rest, seen.statics.detector.quantum_m
+            planned = None if rest is None else Planned(rest, quantum_m, seen.reference_m, balance, settings)
+            stands = memory.stands(seen.sample.now_s, settings)
             if planned is None or planned != self.planned or not stands:
                 memory = stepped(memory, Now.of(seen, balance, settings))
             planned = planned if stands and memory is self.memory else None
@@ -116,14 +118,6 @@ class Planned(NamedTuple):
     reference_m: float
     balance: Balance
     settings: SlideSettings
-
-
-def planned_by(seen: Seen, balance: Balance, settings: SlideSettings) -> Planned | None:
-    """Return by what the law plans; None where that is not only a rest: the stem moves, or an outcome is known."""
-    detector = seen.statics.detector
-    if detector.rest is None or seen.outcome is not None:
-        return None
-    return Planned(detector.rest, detector.quantum_m, seen.reference_m, balance, settings)
 
 
 def let_go(memory: SlideMemory, command_pa: float, bounds: SlideBounds) -> SlideMemory:
