@@ -113,7 +113,7 @@ class SlideMemory:
         return InhibitReason.STUCK if self.stuck_at_m is not None else self.state.reason
 
     def stands(self, now_s: float, bounds: SlideBounds) -> bool:
-        """Whether a plan that finds nothing to do finds nothing later: it waits for no time, reference or slides back."""
+        """Whether a plan that finds nothing to do finds nothing later: no wait, no references and no slides come."""
         waits = isinstance(self.state, Idle) and self.state.reason in ENDS_BY_TIME
         comes = self.course is not None and not self.course.rests(now_s)
         return not (waits or comes) and self.move.refilled(now_s, bounds) is self.move
