@@ -6,11 +6,10 @@ never retries and never repeats an old measurement: what it cannot get it raises
 
 from collections.abc import Mapping
 from dataclasses import dataclass
-from typing import Protocol, Self, runtime_checkable
+from typing import NamedTuple, Protocol, Self, runtime_checkable
 
 
-@dataclass(frozen=True, slots=True)
-class Reading:
+class Reading(NamedTuple):
     """What the device said in one transaction. None is what this device does not offer."""
 
     position_m: float
@@ -27,12 +26,12 @@ class Reading:
         """Return the reading of a sample's quantities, by their names."""
         counter, time_us = values.get("sample_counter"), values.get("device_time_us")
         return cls(
-            position_m=values["position_m"],
-            pressure_pa=values.get("pressure_pa"),
-            sample_counter=None if counter is None else round(counter),
-            device_time_s=None if time_us is None else time_us / 1e6,
-            status=status,
-            emergency=emergency,
+            values["position_m"],
+            values.get("pressure_pa"),
+            None if counter is None else round(counter),
+            None if time_us is None else time_us / 1e6,
+            status,
+            emergency,
         )
 
 

@@ -97,7 +97,7 @@ class CanopenDriver(NodeDriver):
         reading = self._reading(self.pdos.sample())
         if self._watcher.was_interrupted:
             self._watcher.was_interrupted = False
-            return replace(reading, status=reading.status | DeviceStatus.NOT_READY)
+            return reading._replace(status=reading.status | DeviceStatus.NOT_READY)
         return reading
 
     def write(self, command_pa: float) -> None:

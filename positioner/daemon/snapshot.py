@@ -1,6 +1,6 @@
 """What one cycle leaves for the others: replaced whole, never changed."""
 
-from dataclasses import dataclass, replace
+from typing import NamedTuple
 
 from config.codes import Fault, Quality
 from positioner.control.controller_memory import Decision
@@ -8,8 +8,7 @@ from positioner.control.sample import Sample
 from positioner.history.entries import Event
 
 
-@dataclass(frozen=True, slots=True)
-class Snapshot:
+class Snapshot(NamedTuple):
     """The last sample and what was decided on it."""
 
     sample: Sample
@@ -21,4 +20,4 @@ class Snapshot:
         """Return what is true where no cycle has come since for too long: what the next will find, a stall."""
         decision = self.decision
         found = decision._replace(fault=decision.fault or Fault.STALLED)
-        return replace(self, sample=self.sample._replace(quality=Quality.LOST), decision=found)
+        return self._replace(sample=self.sample._replace(quality=Quality.LOST), decision=found)

@@ -9,7 +9,6 @@ A line that comes is {"call": NAME, "given": {...}}, one that goes {"value": ...
 import json
 import sys
 from collections.abc import Callable, Mapping
-from dataclasses import asdict
 from typing import Any
 
 from config.device import ModbusTcpDevice
@@ -73,8 +72,8 @@ def device_calls(port: int) -> Calls:
             raise
 
     return {
-        "read": lambda: ask(lambda: asdict(driver.read())),
-        "exchange": lambda command_pa: ask(lambda: asdict(driver.exchange(command_pa))),
+        "read": lambda: ask(lambda: driver.read()._asdict()),
+        "exchange": lambda command_pa: ask(lambda: driver.exchange(command_pa)._asdict()),
     }
 
 

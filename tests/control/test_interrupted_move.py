@@ -134,15 +134,15 @@ class Loop:
 
 
 def unfit(reading: Reading) -> Reading:
-    return replace(reading, status=int(DeviceStatus.SENSOR_FAULT))
+    return reading._replace(status=int(DeviceStatus.SENSOR_FAULT))
 
 
 def absurd(reading: Reading) -> Reading:
-    return replace(reading, position_m=3.0 * STROKE_M)
+    return reading._replace(position_m=3.0 * STROKE_M)
 
 
 def frozen_at(shown: Reading) -> Callable[[Reading], Reading]:
-    return lambda reading: replace(shown, device_time_s=reading.device_time_s)
+    return lambda reading: shown._replace(device_time_s=reading.device_time_s)
 
 
 FAULTS: dict[Fault, Callable[[Reading], Reading]] = {Fault.DEVICE: unfit, Fault.IMPLAUSIBLE: absurd}

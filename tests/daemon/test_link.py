@@ -122,7 +122,7 @@ def test_a_reply_lost_at_the_start_is_asked_for_again(lost: int, begins: bool, m
 def test_after_a_loss_it_connects_anew_and_looks_before_it_commands() -> None:
     """A device that was restarted must not be moved by the command it had before, nor its status be cleared by it."""
     driver = Scripted(reading(1), NoConnection("gone"), reading(2), held_pa=0.0)
-    driver.shown = replace(reading(9), status=DeviceStatus.COMMUNICATION_LOST)
+    driver.shown = reading(9)._replace(status=DeviceStatus.COMMUNICATION_LOST)
     link = opened(driver, driver.shown)
     samples = [link.exchange(5e4) for _ in range(4)]
     assert driver.opened == 2
@@ -152,7 +152,7 @@ def test_a_device_that_has_vented_or_filled_by_itself_and_kept_its_set_point_is_
 ) -> None:
     """Else it would obey its set point again with the first command: a valve that moves at start or reconnection."""
     driver = Scripted(NoConnection("gone"), held_pa=60e3)
-    driver.shown = replace(reading(1), pressure_pa=shown_pa, status=DeviceStatus.COMMUNICATION_LOST)
+    driver.shown = reading(1)._replace(pressure_pa=shown_pa, status=DeviceStatus.COMMUNICATION_LOST)
     link = Link(driver, DevicePace(), replace(BY_ITSELF, acts_alone_by=told))
     assert link.open()[0] == in_force_pa
     link.exchange(60e3)
@@ -163,13 +163,13 @@ def test_a_device_that_has_vented_or_filled_by_itself_and_kept_its_set_point_is_
 def test_a_device_that_is_operated_locally_is_held_where_it_is(shown_pa: float | None, in_force_pa: float) -> None:
     """Its set point is of before: given back, it would go there."""
     driver = Scripted(held_pa=60e3)
-    driver.shown = replace(reading(1), pressure_pa=shown_pa, status=DeviceStatus.NOT_READY)
+    driver.shown = reading(1)._replace(pressure_pa=shown_pa, status=DeviceStatus.NOT_READY)
     assert Link(driver, DevicePace(), BY_ITSELF).open()[0] == in_force_pa
 
 
 def test_a_device_that_obeys_is_held_at_its_set_point_whatever_pressure_it_shows() -> None:
     driver = Scripted(held_pa=60e3)
-    driver.shown = replace(reading(1), pressure_pa=1e3)
+    driver.shown = reading(1)._replace(pressure_pa=1e3)
     assert Link(driver, DevicePace(), BY_ITSELF).open()[0] == 60e3
 
 
@@ -217,7 +217,7 @@ def test_a_daemon_that_stood_still_looks_at_the_device_before_it_commands_it(
     clock.now_s += 0.4
     samples.append(link.exchange(5e4))
     clock.now_s += 0.6
-    driver.shown = replace(reading(3), status=DeviceStatus.COMMUNICATION_LOST)
+    driver.shown = reading(3)._replace(status=DeviceStatus.COMMUNICATION_LOST)
     samples.append(link.exchange(5e4))
     assert driver.sent_pa == [5e4, 5e4], "nothing was commanded"
     samples.append(link.exchange(0.0))

@@ -337,7 +337,7 @@ def test_an_overrun_is_told_as_itself_beyond_the_sixteenth_cause() -> None:
     """The first word is full: all its bits were set where cause 17 held."""
     panel = Panel(LAW)
     snapshot = panel.cycle.snapshot
-    panel.cycle.snapshot = replace(snapshot, decision=snapshot.decision._replace(alarms=(Fault.OVERRUN,)))
+    panel.cycle.snapshot = snapshot._replace(decision=snapshot.decision._replace(alarms=(Fault.OVERRUN,)))
     low, high = panel.get("ne107_causes"), panel.get("ne107_causes_high")
     assert ne107_causes(low, high) == ["not automatic", Ne107Cause.OVERRUN.text]
 
