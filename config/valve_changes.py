@@ -14,6 +14,11 @@ from config.valve_file import EffectTable, ValveFile, ValveParameters
 FIXED = ("name", "kind", "actuator")
 
 
+def told_changes(values: Mapping[str, float], without: Collection[str]) -> list[str]:
+    """Return in words what was changed in a valve file."""
+    return [f"{name} = {value:g}" for name, value in values.items()] + [f"without {each}" for each in without]
+
+
 def change_valve(file: ValveFile, values: Mapping[str, float], without: Collection[str] = ()) -> ValveFile:
     """Return a valve file with these values, and without these effects.
 

@@ -240,6 +240,8 @@ def ends_the_same_at_home(
     for valve, rms_m in (replayed_by_commands(desk, capsys), replayed_by_notebook(desk)):
         assert (valve_toml(valve), rms_m) == here
     Path("saved.toml").write_text(desk.toml)
+    changed = [f"{name} = " for name in desk.live.moved] + [f"without {each}" for each in desk.live.switched_off]
+    assert all(f"with {each}" in desk.toml for each in changed), "what was set by hand is said in the file"
     assert valve_toml(load_valve("saved.toml")) == here[0]
 
 

@@ -18,6 +18,7 @@ import numpy as np
 
 from config.errors import InputError
 from config.recording import Column, Recording
+from config.valve_changes import told_changes
 from config.valve_file import find_valve, load_valve, valve_alone
 from config.valve_file_writer import valve_toml, write_valve
 from sim.effect import written_here
@@ -396,14 +397,16 @@ class Desk:
 
     @property
     def toml(self) -> str:
-        """The valve file as it is set, with a remark for each step of the journal.
+        """The valve file as it is set, with a remark for each step of the journal and for what was set after them.
 
         Raises:
             InputError: there is none.
         """
         valve = self.as_set()
         beside = [each.path for each in valve.chain if isinstance(each.made, Extended)]
-        remarks = Journal.beside(beside[-1]).remarks(valve.file.valve.own.length) if beside else ()
+        remarks = list(Journal.beside(beside[-1]).remarks(valve.file.valve.own.length)) if beside else []
+        if isinstance(made := valve.made, SetByHand):
+            remarks += [f"{made.before.name} with {each}" for each in told_changes(made.values, made.without)]
         return self.plain("".join(f"# {each}\n" for each in remarks) + valve_toml(valve.file))
 
     def clear(self) -> None:

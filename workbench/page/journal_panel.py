@@ -75,8 +75,7 @@ class JournalPanel:
 
     def _save(self) -> None:
         with errors_told():
-            assert self._desk.valve is not None
-            ui.download.content(self._desk.toml, self._desk.valve.path.name)
+            ui.download.content(self._desk.toml, self._desk.as_set().path.name)
             for name, path in self._desk.effects.items():
                 if f"./{name}.py" in self._desk.toml:
                     ui.download.content(path.read_bytes(), path.name)
