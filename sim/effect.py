@@ -36,10 +36,12 @@ In the pressure path it may also define
     straight   for how long, at most h, s, what leaves it goes straight from t on, while u enters it: a step ends there
 
 What undoes it stands beside its equation, for a daemon that is given the extended valve (`sim.static_inverse`); an
-effect without it is refused there. It is one of
+effect without it is refused there. An effect of the library must have it. It is one of
 
-    INVERSE = "balance"        its functions at a long rest are all of it: the balance is solved for the pressure
-    inverse(q) -> Inverse      it acts in time, or no pressure solves for it: what must be known of it instead
+    INVERSE = "balance"        its functions at a long rest are all of it: the balance is solved for the pressure, which
+                               must rise with x (a force: dF/dx < k_s)
+    inverse(q) -> Inverse      it acts in time, or no pressure solves for it: what must be known of it instead, as
+                               Inverse(lag_s=q.time_constant_s) of `config.extended_valve`
 
 A function names among its arguments only what it needs of: t (s), x (m), v (m/s), p (actuator pressure, Pa), q (the
 parameters), z (the memory, an array), and what its place adds. The pressure path sees the stem of the start of the

@@ -73,9 +73,14 @@ def run(arguments: argparse.Namespace) -> int:
         ),
         *(
             (name, check, files[0])
-            for name, check in (("supervisory", _supervisory), ("history", _history), ("timing", _timing))
+            for name, check in (
+                ("supervisory", _supervisory),
+                ("history", _history),
+                ("timing", _timing),
+                ("system", _system),
+                ("priority", _priority),
+            )
         ),
-        *((name, check, files[0]) for name, check in (("system", _system), ("priority", _priority))),
         *(("certificates", check_certificates, file) for file in files),
     ]
     for file in files:

@@ -70,7 +70,7 @@ def _configuration(reader: str, config: Path | None) -> None:
 
 def _map() -> list[dict[str, object]]:
 
-    return [_row(register) for register in REGISTERS]
+    return [_row(register) for register in sorted(REGISTERS, key=lambda register: register.address)]
 
 
 def _row(register: Register) -> dict[str, object]:

@@ -81,7 +81,7 @@ def test_a_standard_stream_that_is_closed_is_nowhere(words: list[str], status: i
 
 def test_help_names_every_command_and_each_has_an_example() -> None:
     everything = subprocess.run(
-        [sys.executable, "-m", "positioner.cli", "--help"], capture_output=True, text=True, check=True
+        [sys.executable, "-m", "positioner", "--help"], capture_output=True, text=True, check=True
     ).stdout
     assert all(re.search(rf"^ +{name}\b", everything, re.MULTILINE) for name in all_commands())
 
@@ -305,7 +305,8 @@ def test_no_command_takes_a_number_that_is_none() -> None:
 def test_the_map_is_complete_in_every_format(capsys: Capture) -> None:
     main(["map", "--format", "json"])
     rows = json.loads(capsys.readouterr().out)
-    assert [row["name"] for row in rows] == [register.name for register in REGISTERS]
+    assert {row["name"] for row in rows} == {register.name for register in REGISTERS}
+    assert [row["address"] for row in rows] == sorted(register.address for register in REGISTERS)
     assert all(row["address_from_1"] == row["address"] + 1 for row in rows)
     main(["map", "--format", "csv"])
     assert len(list(csv.DictReader(io.StringIO(capsys.readouterr().out)))) == len(rows)

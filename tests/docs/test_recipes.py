@@ -41,6 +41,17 @@ def test_there_is_a_recipe_for_all_that_is_added_often() -> None:
     assert set(RECIPES) == WANTED
 
 
+@pytest.mark.parametrize("name", RECIPES)
+def test_a_recipe_s_blocks_fit_the_tree(name: str, tmp_path: Path) -> None:
+    for language, file, _ in blocks(name):
+        if language != "sh" and (ROOT / file).exists():
+            (tmp_path / file).parent.mkdir(parents=True, exist_ok=True)
+            shutil.copy(ROOT / file, tmp_path / file)
+    assert write(name, tmp_path)
+    for path in tmp_path.rglob("*.py"):
+        compile(path.read_text(encoding="utf-8"), path, "exec")
+
+
 @pytest.mark.long
 @pytest.mark.parametrize("name", RECIPES)
 def test_a_recipe_can_be_followed(name: str, tmp_path: Path) -> None:
@@ -48,20 +59,30 @@ def test_a_recipe_can_be_followed(name: str, tmp_path: Path) -> None:
     for room in ROOMS:
         shutil.copytree(ROOT / room, tree / room, ignore=shutil.ignore_patterns("img", BEING_WRITTEN))
     shutil.copy(ROOT / "pyproject.toml", tree)
+    commands = write(name, tree)
+    install(tree)
+    for command in commands:
+        run(command, tree)
+
+
+def blocks(name: str) -> list[tuple[str, str, str]]:
+    """Return language, file and text of each block of a recipe, after those of the page that it goes on from."""
+    return BLOCK.findall(RECIPES.get(BEGINS_AFTER.get(name, ""), "") + RECIPES[name])
+
+
+def write(name: str, tree: Path) -> list[str]:
+    """Write a recipe's files and changes into a tree; return its command lines."""
     commands = []
-    for language, file, text in BLOCK.findall(RECIPES.get(BEGINS_AFTER.get(name, ""), "") + RECIPES[name]):
+    for language, file, text in blocks(name):
         if language == "sh":
             commands += text.splitlines()
         elif language == "diff":
             change(tree / file, text)
         else:
             assert not (tree / file).exists(), f"{file} is no new file"
-            (tree / file).parent.mkdir(exist_ok=True)
+            (tree / file).parent.mkdir(parents=True, exist_ok=True)
             (tree / file).write_text(text, encoding="utf-8")
-    install(tree)
-    assert commands
-    for command in commands:
-        run(command, tree)
+    return commands
 
 
 def change(path: Path, diff: str) -> None:
