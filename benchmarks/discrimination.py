@@ -45,7 +45,7 @@ from workbench.discriminate.discrimination import (
     discriminate,
 )
 from workbench.discriminate.experiment_design import Bounds, DesignedExperiment, Terms, courses
-from workbench.discriminate.rival_race import RivalRace
+from workbench.discriminate.rival_odds import RivalOdds
 from workbench.fit.fit_result import Fit
 from workbench.fit.fitting import fit
 from workbench.select.effect_candidates import pressure_speaks_against
@@ -61,7 +61,7 @@ WHOLE = 1000
 """More moves than an input of the menu has."""
 
 
-def menu(race: RivalRace, terms: Terms) -> DesignedExperiment | None:
+def menu(race: RivalOdds, terms: Terms) -> DesignedExperiment | None:
     """Choose the whole input of the menu as a diagnosis does; there are no shorter ones.
 
     What told nothing comes again: a diagnosis knows of no round before.

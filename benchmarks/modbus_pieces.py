@@ -17,9 +17,9 @@ from pymodbus.pdu.register_message import (
 )
 
 from config.register_format import Format
-from fieldbus.modbus.connection import HEADER
+from fieldbus.modbus.function_codes import decoded
 from fieldbus.modbus.register_packing import Layout
-from fieldbus.modbus.register_requests import decoded
+from fieldbus.modbus.server_connection import HEADER
 
 ROUNDS, CALLS = 300, 50
 CYCLE_WORDS, MOST_WORDS = 11, 125

@@ -12,7 +12,7 @@ Its files:
     file_kinds                                    which of these a file is, where another is asked for
     file_prefix                                   what the names of a valve's files begin with
     json_value                                    a result as JSON has it, which knows no NaN
-    toml_text                                     keys given new values in a text whose comments stay
+    toml_editing                                  keys given new values in a text whose comments stay
     whole_file, lock_file                         replaces a file, or fills a folder, whole or not at all; a lock
     device, canopen_device                        table [device], on Modbus and on CANopen
     supervision_table, record_tables              tables [safety] and [supervision]; [recorder] and [history]
@@ -24,7 +24,7 @@ Its files:
     register_format                               values in words
     registers, codes, roles                       the supervisory table; every code and its text; who may write
     passwords, role_passwords                     passwords as they are kept; the file with those of the roles
-    recording, plausibility                       the recording format; what is odd about a recording
+    recording, recording_oddities                 the recording format; what is odd about a recording
     recorder_files                                the files of a daemon's recorder, by their names
     results                                       what results have in common in a notebook
     arguments                                     what the library's functions are given: other kinds are refused

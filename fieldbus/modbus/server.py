@@ -1,7 +1,7 @@
 """A Modbus TCP server of 16-bit registers, for both towers: the simulated slave and the supervisory registers.
 
-Each client has a thread, so that a slow or dropped one holds up nobody (`fieldbus.modbus.connection` has the frames);
-what a request means, `fieldbus.modbus.register_requests` says. A client may read any part of a value; only both words
+Each client has a thread, so that a slow or dropped one holds up nobody (`server_connection` has the frames);
+what a request means, `function_codes` says. A client may read any part of a value; only both words
 from one request belong together.
 
 On TCP the address of the device is its IP address: unit 0 and 255 mean "this device", as does its own number.
@@ -28,10 +28,10 @@ from pymodbus.constants import ExcCodes
 from config.errors import InputError
 from fieldbus.modbus.admission import Admitted, Allowance, Places, ServerLimits
 from fieldbus.modbus.client_roles import NOBODY, Identity, NotAuthorized
-from fieldbus.modbus.connection import Connection, endpoint
 from fieldbus.modbus.exception_codes import exception_reply
-from fieldbus.modbus.register_requests import RegisterAnswers, Registers
+from fieldbus.modbus.function_codes import RegisterAnswers, Registers
 from fieldbus.modbus.request_counts import RequestCounts
+from fieldbus.modbus.server_connection import ServerConnection, endpoint
 from fieldbus.modbus.tls import Guard, failure_reason
 
 log = logging.getLogger(__name__)
@@ -180,7 +180,7 @@ class _Listener(ThreadingTCPServer):
         self._places = Places(limits)
         self._sayable = Allowance(REFUSALS_SAID_PER_S, REFUSALS_SAID)
         self._unsaid = 0
-        super().__init__(address, Connection)
+        super().__init__(address, ServerConnection)
 
     @property
     def port(self) -> int:

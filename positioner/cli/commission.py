@@ -7,7 +7,7 @@ from typing import TYPE_CHECKING, Any
 
 from config.errors import InputError
 from config.file_kinds import require_kind
-from config.toml_text import with_values
+from config.toml_editing import with_values
 from config.whole_file import replace_whole
 from positioner.cli.parts.breaking_off import end_as_by_ctrl_c
 from positioner.cli.parts.config_argument import add_config, config_file

@@ -112,7 +112,7 @@ def check_packages() -> str:
 
 
 def _config(file: "DaemonFile", path: Path) -> str:
-    from config.plausibility import odd_settings
+    from config.recording_oddities import odd_settings
 
     travel = file.valve.travel
     said = f"{path}: {file.valve.name}, stroke {file.valve.plain.said(travel.stroke_m, 'g')}, {travel.words}"

@@ -29,7 +29,7 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
 
 def run(arguments: argparse.Namespace) -> int:
     """Print what the file holds, or what is read of it; 0."""
-    from config.plausibility import oddities
+    from config.recording_oddities import oddities
     from workbench.imports.column_mapping import read_status
     from workbench.imports.export_preview import preview
     from workbench.imports.own_format import own_recording

@@ -19,7 +19,7 @@ from config.errors import InputError
 from config.extended_valve import ExtendedValve
 from drivers import driver_for
 from drivers.boundary import DriverError
-from fieldbus.modbus.register_requests import Registers
+from fieldbus.modbus.function_codes import Registers
 from fieldbus.modbus.request_counts import RequestCounts
 from positioner.control.controller import Controller
 from positioner.control.requests import Requests

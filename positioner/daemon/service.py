@@ -19,7 +19,7 @@ from config.registers import WRITER_AT
 from config.roles import Role
 from config.tls_table import Tls
 from fieldbus.modbus.admission import ServerLimits
-from fieldbus.modbus.register_requests import Registers
+from fieldbus.modbus.function_codes import Registers
 from fieldbus.modbus.request_counts import RequestCounts
 from fieldbus.modbus.server import RegisterServer
 from fieldbus.modbus.tls import Guard

@@ -40,7 +40,7 @@ from config.registers import (
     Register,
 )
 from config.travel import Travel
-from fieldbus.modbus.register_requests import RegisterError, Table
+from fieldbus.modbus.function_codes import RegisterError, Table
 from fieldbus.modbus.request_counts import RequestCounts
 from positioner.control.controller_memory import Decision
 from positioner.control.requests import Requests

@@ -29,7 +29,7 @@ from typing import NamedTuple
 from pymodbus.constants import ExcCodes
 
 from config.errors import InputError
-from fieldbus.modbus.register_requests import RegisterError, Registers, Table
+from fieldbus.modbus.function_codes import RegisterError, Registers, Table
 from fieldbus.modbus.request_counts import RequestCounts
 from positioner.daemon.assembled_valves import AssembledValves, Share
 from positioner.daemon.end_signals import Endings

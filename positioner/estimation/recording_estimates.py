@@ -11,8 +11,8 @@ import numpy as np
 
 from config.arguments import kinds_held
 from config.errors import InputError
-from config.plausibility import odd_sizes
 from config.recording import Recording
+from config.recording_oddities import odd_sizes
 from config.registers import ESTIMATED
 from config.results.block import Block, Table
 from config.results.result import Result

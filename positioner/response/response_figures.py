@@ -14,8 +14,8 @@ from numpy.typing import NDArray
 
 from config.arguments import kinds_held
 from config.drive import Scale
-from config.plausibility import odd_sizes
 from config.recording import Column, Recording
+from config.recording_oddities import odd_sizes
 from positioner.response.figure import Figure, no_value
 from positioner.response.measured_dead_band import dead_band_and_resolution
 from positioner.response.response_result import ResponseFigures

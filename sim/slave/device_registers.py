@@ -15,8 +15,8 @@ from pymodbus.constants import ExcCodes
 
 from config.modbus_map import SIMULATED_MAP, ModbusMap, Place
 from config.quantities import WRITABLE, CommunicationAction
+from fieldbus.modbus.function_codes import RegisterError, Table
 from fieldbus.modbus.register_packing import layout
-from fieldbus.modbus.register_requests import RegisterError, Table
 from sim.slave.clocks import Clock
 from sim.slave.simulated_device import Device
 

@@ -11,7 +11,7 @@ from threading import Event, Thread
 
 from config.errors import explain_failure
 from config.serial_port import SerialPort
-from fieldbus.modbus.register_requests import RegisterAnswers, Registers
+from fieldbus.modbus.function_codes import RegisterAnswers, Registers
 from fieldbus.modbus.rtu import BROADCAST, ECHO, LARGEST_FRAME, framed, is_whole
 from fieldbus.modbus.serial_line import SerialLine
 

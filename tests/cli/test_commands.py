@@ -20,8 +20,8 @@ import pytest
 import yaml
 
 import config
-from config.plausibility import odd_settings
 from config.recording import read_recording
+from config.recording_oddities import odd_settings
 from config.registers import REGISTERS
 from positioner.cli.main import command_parser, main
 from positioner.cli.parts.command_finder import all_commands

@@ -16,8 +16,8 @@ import numpy as np
 import pytest
 
 from config.errors import InputError
-from config.plausibility import oddities
 from config.recording import Recording
+from config.recording_oddities import oddities
 from workbench.imports.column_mapping import ExportOptions, Status, read_mapping
 from workbench.imports.export_preview import preview
 from workbench.imports.historian_export import PLAIN, read_export

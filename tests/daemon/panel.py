@@ -10,7 +10,7 @@ from config.registers import BY_NAME
 from config.slave_file import SlaveFile
 from config.travel import Travel
 from config.valve_file import shipped_valve
-from fieldbus.modbus.register_requests import RegisterError
+from fieldbus.modbus.function_codes import RegisterError
 from positioner.control.requests import Requests
 from positioner.control.travel.signal_path import SignalPath
 from positioner.daemon.cycle import Cycle

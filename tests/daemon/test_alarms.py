@@ -17,7 +17,7 @@ from config.codes import AlarmState, EventKind, ExperimentState, Mode, Ne107Caus
 from config.daemon_file import DaemonFile, HealthTable
 from config.errors import InputError
 from config.loading import validate
-from fieldbus.modbus.register_requests import RegisterError
+from fieldbus.modbus.function_codes import RegisterError
 from fieldbus.modbus.server import RegisterServer
 from positioner.cli.main import main
 from positioner.daemon.alarms.alarm_list import AlarmList

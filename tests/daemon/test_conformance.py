@@ -19,8 +19,8 @@ from config.slave_file import SlaveFile
 from config.valve_file import shipped_valve
 from fieldbus.modbus import admission
 from fieldbus.modbus.admission import MOST_CLIENTS
-from fieldbus.modbus.connection import SEND_TIMEOUT_S
 from fieldbus.modbus.server import RegisterServer
+from fieldbus.modbus.server_connection import SEND_TIMEOUT_S
 from positioner.cli.parts.children import port_in
 from positioner.dcs import Dcs
 from sim.slave.clocks import Lockstep

@@ -5,7 +5,7 @@ from pymodbus.constants import ExcCodes
 
 from config.codes import ExperimentState
 from config.registers import BY_NAME, MOST_EXPERIMENT_POINTS
-from fieldbus.modbus.register_requests import RegisterError
+from fieldbus.modbus.function_codes import RegisterError
 from tests.daemon.panel import Panel, refused
 
 POINTS = ((0.0, 30e3), (0.05, 30e3), (0.2, 40e3))

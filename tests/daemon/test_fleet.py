@@ -20,7 +20,7 @@ from config.slave_file import SlaveFile
 from config.valve_file import shipped_valve
 from drivers import driver_for
 from drivers.boundary import Capabilities, NoConnection, NoReply, Reading
-from fieldbus.modbus.register_requests import RegisterAnswers
+from fieldbus.modbus.function_codes import RegisterAnswers
 from fieldbus.modbus.rtu import ECHO, framed, is_whole
 from fieldbus.modbus.server import RegisterServer
 from positioner.cli import doctor

@@ -16,8 +16,8 @@ from config.registers import BY_NAME, REGISTERS, SIZE, Register
 from config.roles import Role
 from fieldbus.modbus.admission import ServerLimits
 from fieldbus.modbus.client_roles import Identity, NotAuthorized
-from fieldbus.modbus.connection import HEADER
 from fieldbus.modbus.server import RegisterServer
+from fieldbus.modbus.server_connection import HEADER
 from fieldbus.modbus.tls import client_context
 from positioner.daemon.service import guard_of
 from tests.certificates import tls

@@ -10,7 +10,7 @@ from pymodbus.constants import ExcCodes
 from config.codes import Fault, InhibitReason, Mode, Ne107Status, Quality
 from config.registers import BY_NAME, FLOAT_TEST, LONG_TEST, SIZE, WORD_TEST
 from drivers.boundary import Capabilities, NoConnection, Reading
-from fieldbus.modbus.register_requests import RegisterError
+from fieldbus.modbus.function_codes import RegisterError
 from fieldbus.modbus.server import RegisterServer
 from positioner import dcs
 from positioner.daemon.supervisory_registers import version_numbers

@@ -18,7 +18,7 @@ import pytest
 from config.codes import EventKind, Mode
 from config.daemon_file import load_valves
 from config.errors import InputError
-from fieldbus.modbus.register_requests import RegisterError
+from fieldbus.modbus.function_codes import RegisterError
 from fieldbus.modbus.request_counts import RequestCounts
 from positioner.cli.parts.children import port_in
 from positioner.daemon import workers

@@ -24,9 +24,9 @@ from drivers.modbus_tcp import ModbusTcpDriver
 from fieldbus.modbus import client as modbus_client
 from fieldbus.modbus.client import ModbusClient
 from fieldbus.modbus.client_errors import NotConnected, ReplyTimeout
-from fieldbus.modbus.connection import Connection
 from fieldbus.modbus.rtu import framed
 from fieldbus.modbus.server import RegisterServer
+from fieldbus.modbus.server_connection import ServerConnection
 from fieldbus.modbus.tls import Guard
 from positioner.cli.parts.pseudo_line import pseudo_line
 from sim.slave.clocks import Lockstep
@@ -187,7 +187,7 @@ def test_a_device_that_dribbles_on_tcp_is_no_reply(
     server.start()
     driver = ModbusTcpDriver(ModbusTcpDevice(port=server.port, reply_timeout_s=TIMEOUT_S, tls=table))
 
-    honest, slow = Connection.handle, list[bool]()
+    honest, slow = ServerConnection.handle, list[bool]()
 
     class Line:
         def __init__(self, line: socket.socket) -> None:
@@ -202,11 +202,11 @@ def test_a_device_that_dribbles_on_tcp_is_no_reply(
             else:
                 self._line.sendall(data)
 
-    def handle(connection: Connection) -> None:
+    def handle(connection: ServerConnection) -> None:
         connection.request = Line(connection.request)  # type: ignore[assignment]
         honest(connection)
 
-    monkeypatch.setattr(Connection, "handle", handle)
+    monkeypatch.setattr(ServerConnection, "handle", handle)
     driver.open()
     slow.append(True)
     with pytest.raises(NoReply, match="no reply within 200 ms"):

@@ -16,7 +16,7 @@ from config.errors import InputError
 from fieldbus.modbus import connection as connection_module
 from fieldbus.modbus import server as server_module
 from fieldbus.modbus.admission import MOST_CLIENTS, ServerLimits
-from fieldbus.modbus.register_requests import RegisterError, Table
+from fieldbus.modbus.function_codes import RegisterError, Table
 from fieldbus.modbus.server import RegisterServer
 from tests.independent import independent_client, refused_with
 

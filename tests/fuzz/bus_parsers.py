@@ -22,9 +22,9 @@ from fieldbus.canopen.eds import read_eds
 from fieldbus.modbus.client import ModbusClient
 from fieldbus.modbus.client_errors import ClientError
 from fieldbus.modbus.client_roles import Identity, NotAuthorized, authorize
-from fieldbus.modbus.connection import HEADER, Connection
-from fieldbus.modbus.register_requests import RegisterAnswers
+from fieldbus.modbus.function_codes import RegisterAnswers
 from fieldbus.modbus.rtu import framed, is_whole
+from fieldbus.modbus.server_connection import HEADER, ServerConnection
 from sim.slave.canopen_node import CanopenNode
 from sim.slave.clocks import Lockstep
 from sim.slave.device_registers import DeviceRegisters
@@ -95,7 +95,7 @@ def stream_at_the_server(answers: RegisterAnswers) -> Callable[[bytes], None]:
     host = SimpleNamespace(answer=lambda _unit, pdu, peer: answers.answer(pdu, peer), note_use=lambda _peer: 0.0)
 
     def parse(data: bytes) -> None:
-        connection = object.__new__(Connection)
+        connection = object.__new__(ServerConnection)
         connection.request, connection.client_address = _Sender(data), ("127.0.0.1", 1)  # type: ignore[assignment]
         connection.server = host
         connection.handle()

@@ -13,7 +13,7 @@ from typing import Any
 
 import can
 
-from fieldbus.modbus.register_requests import RegisterAnswers
+from fieldbus.modbus.function_codes import RegisterAnswers
 from fieldbus.modbus.rtu import framed
 
 Answer = Callable[[bytes], bytes]

@@ -11,7 +11,7 @@ from pymodbus.constants import ExcCodes
 from config.errors import InputError
 from config.modbus_map import SIMULATED_MAP
 from config.slave_file import load_slave
-from fieldbus.modbus.register_requests import RegisterError
+from fieldbus.modbus.function_codes import RegisterError
 from sim.slave.clocks import Lockstep
 from sim.slave.device_registers import DeviceRegisters
 from sim.slave.simulated_device import Device

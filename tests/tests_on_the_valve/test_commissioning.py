@@ -14,7 +14,7 @@ from config.daemon_file import DaemonFile, load_daemon
 from config.errors import InputError
 from config.recording import Recording
 from config.slave_file import DeviceFault, Initial
-from config.toml_text import with_values
+from config.toml_editing import with_values
 from config.travel import ActionWord
 from config.valve_file import EffectTable
 from positioner.cli.commission import write_proposals

@@ -19,7 +19,7 @@ from sim.effect import shipped_effect, shipped_effects
 from sim.open_loop import respond
 from tests.workbench.hand_made import AT_FLOOR, fit_of
 from tests.workbench.valves import drawn_valve, record_of, with_effect
-from workbench.discriminate import rival_race
+from workbench.discriminate import rival_odds
 from workbench.discriminate.discrimination import SURE, Discrimination, Played, Player, Round, discriminate
 from workbench.discriminate.experiment_design import (
     MOST_MOVES,
@@ -30,7 +30,7 @@ from workbench.discriminate.experiment_design import (
     Terms,
     tells_apart,
 )
-from workbench.discriminate.rival_race import ASKED, RivalRace, Weighed, evidence
+from workbench.discriminate.rival_odds import ASKED, RivalOdds, Weighed, evidence
 from workbench.fit.fit_result import Fit
 from workbench.fit.fitting import fit
 from workbench.select.separating_experiment import REST_S
@@ -119,9 +119,9 @@ def test_a_pair_that_no_course_tells_apart_is_left_out_unless_there_is_no_other(
 def test_an_experiment_is_designed_for_the_likeliest(
     fits: dict[str, Fit], recording: Recording, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    race = RivalRace({f"ip_lag {i}": fits["ip_lag"] for i in range(ASKED + 1)}, (recording,), 1)
+    race = RivalOdds({f"ip_lag {i}": fits["ip_lag"] for i in range(ASKED + 1)}, (recording,), 1)
     asked: list[object] = []
-    monkeypatch.setattr(rival_race, "design_experiment", lambda left, *_, **__: asked.extend(left))
+    monkeypatch.setattr(rival_odds, "design_experiment", lambda left, *_, **__: asked.extend(left))
     race.experiment(Terms(BOUNDS))
     assert len(race.alive) > ASKED
     assert asked == race.alive[:ASKED]
@@ -156,7 +156,7 @@ class Design:
     def asked(self) -> list[int]:
         return [each.most_moves for each in self.terms]
 
-    def __call__(self, race: RivalRace, terms: Terms) -> DesignedExperiment | None:
+    def __call__(self, race: RivalOdds, terms: Terms) -> DesignedExperiment | None:
         self.terms.append(terms)
         return self._few if terms.most_moves < MOST_MOVES else self._many
 
@@ -202,7 +202,7 @@ def test_where_nothing_else_promises_all_are_asked_again(fits: dict[str, Fit], r
     twin = {"ip_lag": fits["ip_lag"], "rate_limit": fits["ip_lag"]}
 
     class Once(Design):
-        def __call__(self, race: RivalRace, terms: Terms) -> DesignedExperiment | None:
+        def __call__(self, race: RivalOdds, terms: Terms) -> DesignedExperiment | None:
             chosen = super().__call__(race, terms)
             return None if terms.without else chosen
 
@@ -341,7 +341,7 @@ def test_an_effect_that_begins_to_act_only_then_gives_no_odds(fits: dict[str, Fi
 def test_the_best_is_not_named_if_it_does_not_explain_the_experiments(
     fits: dict[str, Fit], recording: Recording, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    monkeypatch.setattr("workbench.discriminate.rival_race.RARELY_OFF", 0.5)
+    monkeypatch.setattr("workbench.discriminate.rival_odds.RARELY_OFF", 0.5)
     found = discriminate(fits, [recording], answering, BOUNDS, LIBRARY, design=Design(2.0))
     assert (found.outcome, found.named) == ("unexplained", ())
     assert found.odds >= 100.0

@@ -17,8 +17,8 @@ import numpy.typing as npt
 
 from config.drive import KINDS, VALVE, KindName
 from config.errors import InputError
-from config.plausibility import in_each_others_place
 from config.recording import BEHIND_POSITIONER, REQUIRED, Column, Recording
+from config.recording_oddities import in_each_others_place
 from config.results.result import Brief
 from config.valve_file import ValveParameters
 from signals.moves import AT_ONCE, rests_first, slips

@@ -7,7 +7,7 @@
     unexplained    the best one does not explain the experiments: the effect is none of the rivals
     stopped        the valve did not play an experiment: a permissive, a veto, a fault
 
-How they are weighed stands in `rival_race`. Members of one class by algebra (`equivalence`) are one rival; no
+How they are weighed stands in `rival_odds`. Members of one class by algebra (`equivalence`) are one rival; no
 experiment is played for them.
 """
 
@@ -30,7 +30,7 @@ from workbench.discriminate.experiment_design import (
     DesignedExperiment,
     Terms,
 )
-from workbench.discriminate.rival_race import ODDS, RivalRace
+from workbench.discriminate.rival_odds import ODDS, RivalOdds
 from workbench.discriminate.rivals_by_pressure import race_by_pressure
 from workbench.fit.fit_result import Fit
 from workbench.fit.fitted_parameter import parameters_json
@@ -62,11 +62,11 @@ Player = Callable[[DesignedExperiment], Played]
 """Plays an experiment on the valve, real or simulated."""
 
 
-Designer = Callable[[RivalRace, Terms], DesignedExperiment | None]
+Designer = Callable[[RivalOdds, Terms], DesignedExperiment | None]
 """Chooses the next experiment; None if none is allowed."""
 
 
-def by_design(race: RivalRace, terms: Terms) -> DesignedExperiment | None:
+def by_design(race: RivalOdds, terms: Terms) -> DesignedExperiment | None:
     """Return the experiment that separates the likeliest rivals the most."""
     return race.experiment(terms)
 
@@ -225,7 +225,7 @@ def discriminate(
     gathered = tuple(tuple(sorted(each, key=list(fits).index)) for each in classes(fits, library))
     if len(gathered) > 1:
         fits = race_by_pressure(fits, recordings, library, workers)
-    race = RivalRace({each[0]: fits[each[0]] for each in gathered}, tuple(recordings), workers)
+    race = RivalOdds({each[0]: fits[each[0]] for each in gathered}, tuple(recordings), workers)
     rounds: list[Round] = []
     experiments: list[Recording] = []
     outcome: Outcome | None = "one_class" if len(gathered) == 1 else None
@@ -263,7 +263,7 @@ def discriminate(
     return Discrimination(outcome, named, gathered, tuple(rounds), race.odds, race.fits, tuple(experiments), problem)
 
 
-def _choose_experiment(race: RivalRace, terms: Terms, design: Designer) -> DesignedExperiment | None:
+def _choose_experiment(race: RivalOdds, terms: Terms, design: Designer) -> DesignedExperiment | None:
     """Return the shortest experiment that will do by what it separates, or else the one that separates most."""
     best = None
     for most in sorted({min(each, terms.most_moves) for each in (FEW_MOVES, MOST_MOVES)}):

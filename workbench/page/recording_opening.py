@@ -5,8 +5,8 @@ from pathlib import Path
 from typing import Self
 
 from config.errors import InputError
-from config.plausibility import oddities
 from config.recording import Recording
+from config.recording_oddities import oddities
 from workbench.compare.comparison_sentences import shorten_notes
 from workbench.data.record import Record, ready, require_few_samples
 from workbench.imports.column_mapping import list_units

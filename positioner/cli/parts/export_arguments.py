@@ -186,7 +186,7 @@ def _stretch(recording: "Recording", arguments: argparse.Namespace) -> "Recordin
 
 def tell(who: str, recording: "Recording", stroke_m: float | None) -> None:
     """Say on standard error what was done to an export, and what is odd about it."""
-    from config.plausibility import oddities
+    from config.recording_oddities import oddities
 
     for key, value in recording.metadata.items():
         if key != "imported":

@@ -14,7 +14,7 @@ from config.slave_file import SlaveFile
 from config.supervision_table import SupervisionTable
 from config.travel import Travel
 from config.valve_file import load_valve, shipped_valve
-from fieldbus.modbus.register_requests import RegisterError
+from fieldbus.modbus.function_codes import RegisterError
 from northbound.observer.register_words import ne107_causes
 from positioner.control.controller_memory import Decision
 from positioner.control.requests import Requests

@@ -41,7 +41,7 @@ class Host(Protocol):
         ...
 
 
-class Connection(BaseRequestHandler):
+class ServerConnection(BaseRequestHandler):
     """Serves one client in the thread that makes it, until either side ends it."""
 
     request: socket.socket

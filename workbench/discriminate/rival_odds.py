@@ -66,7 +66,7 @@ def agreed(z: float) -> float:
     return float(log_ndtr(z) - log_ndtr(-z))
 
 
-class RivalRace:
+class RivalOdds:
     """The rivals in all recordings so far."""
 
     def __init__(
@@ -74,7 +74,7 @@ class RivalRace:
         fits: Mapping[str, Fit],
         recordings: tuple[Recording, ...],
         workers: int | None,
-        begun: "RivalRace | None" = None,
+        begun: "RivalOdds | None" = None,
     ) -> None:
         self._recordings = recordings
         self._begun = begun or self
@@ -152,9 +152,9 @@ class RivalRace:
         counted = self._part.counted & (np.arange(len(self.record)) >= first)
         return event_errors_m(self.fits[name], replace(self._part, counted=counted))
 
-    def with_recording(self, recording: Recording) -> "RivalRace":
+    def with_recording(self, recording: Recording) -> "RivalOdds":
         """Return it after another recording: every rival fitted anew to all, from where it was."""
-        race = RivalRace(self.fits, (*self._recordings, recording), self._workers, self._begun)
+        race = RivalOdds(self.fits, (*self._recordings, recording), self._workers, self._begun)
 
         def refit_rival(found: Fit) -> Fit:
             return refit(problem_of(found, race.record), found)

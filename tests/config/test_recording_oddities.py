@@ -4,8 +4,8 @@ import numpy as np
 import pytest
 
 from config.drive import KINDS
-from config.plausibility import oddities
 from config.recording import KIND, Column, Recording
+from config.recording_oddities import oddities
 
 T = np.arange(0.0, 60.0, 0.05)
 RNG = np.random.default_rng(1)
