@@ -267,7 +267,7 @@ class Effect:
 
 def shipped_effects() -> list[str]:
     """Return the names of the effects that come with the package."""
-    return sorted(each[:-3] for each in os.listdir(SHIPPED) if each.endswith(".py") and each[0] != "_")
+    return list(_names_in(SHIPPED))
 
 
 def tried_effects() -> list[str]:
@@ -292,7 +292,18 @@ def shipped_effect(name: str, source: str) -> Effect:
 
 
 def _shipped(name: str) -> Effect:
-    return read_effect(SHIPPED / f"{name}.py")
+    return _read_once(SHIPPED / f"{name}.py")
+
+
+@cache
+def _names_in(folder: Path) -> tuple[str, ...]:
+    """Return the names of the effects in a folder of the package, which stays as it is while a process runs."""
+    return tuple(sorted(each[:-3] for each in os.listdir(folder) if each.endswith(".py") and each[0] != "_"))
+
+
+@cache
+def _read_once(path: Path) -> Effect:
+    return read_effect(path)
 
 
 def find_effects(names: Sequence[str], source: str) -> list[Effect]:

@@ -68,7 +68,8 @@ def solved(
 
     def P(f: Array, n: int) -> Array:  # noqa: N802 - n-fold integral, the field's letter
         for _ in range(n):
-            f = np.concatenate(([0.0], np.cumsum((f[1:] + f[:-1]) * (h / 2))))
+            steps = (f[1:] + f[:-1]) * (h / 2)
+            f = np.append(0.0, np.cumsum(steps))
         return f
 
     q = P(-(t**3) * x, 1) + 9 * P(t**2 * x, 2) + 18 * P(-t * x, 3) + 6 * P(x, 4)

@@ -9,9 +9,6 @@ after the other, and this command plays the DCS over Modbus TCP:
 
 What a daemon identified is compared with the truth here, where it is known; no daemon ever has it.
 
-`--hidden` gives the valve an effect that nobody has told the daemon, finds it in the daemon's own recording, gives the
-daemon the extended valve and makes the same steps again (`parts.hidden_demo`).
-
 `--loop flow`, in a clone alone, says what each law makes of a flow loop in virtual time (`benchmarks/flow`).
 """
 
@@ -198,11 +195,6 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
     """Declare the command line."""
     parser.add_argument("--bus", choices=tuple(BUSES), default="modbus", help="the fieldbus")
     parser.add_argument(
-        "--hidden",
-        action="store_true",
-        help="add an effect to the valve, find it in the daemon's recording, and give it to the law",
-    )
-    parser.add_argument(
         "--loop", choices=("flow",), help="simulate each law in a flow loop, faster than real time; needs a clone"
     )
     parser.add_argument("--out", type=Path, metavar="DIR", help="folder for picture, recordings, files and logs")
@@ -217,11 +209,6 @@ def run(arguments: argparse.Namespace) -> int:
         flow = benchmark("flow", "--loop flow")
         status: int = flow.compared(flow.CASES, arguments.out)
         return status
-    if arguments.hidden:
-        from positioner.cli.parts.hidden_demo import run_hidden
-
-        with _folder(arguments.out) as folder:
-            return run_hidden(arguments.bus, folder.resolve(), arguments.json)
     return _run_steps(arguments)
 
 

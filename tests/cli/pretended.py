@@ -1,7 +1,5 @@
 """`python -m tests.cli.pretended SYSTEM COMMAND ...`: a command of positioner as on a system that lacks what Linux has.
 
-After the word `then` follows another, in the same process; the worst of the exit statuses is the process's.
-
 Not pretended is what libraries ask for because they see Linux: numpy and ifaddr want os.uname, asyncio AF_UNIX; uvloop,
 which there is not on Windows, is away.
 """
@@ -13,7 +11,6 @@ import signal
 import socket
 import sys
 import time
-from itertools import groupby
 from typing import Any
 
 WINDOWS_LACKS = ("fcntl", "termios", "resource", "pwd", "grp", "tty", "pty", "uvloop")
@@ -64,5 +61,4 @@ if __name__ == "__main__":
     {"windows": as_windows, "macos": as_macos}[sys.argv[1]]()
     from positioner.cli.main import main
 
-    commands = (list(words) for then, words in groupby(sys.argv[2:], lambda word: word == "then") if not then)
-    sys.exit(max(main(words) for words in commands))
+    sys.exit(main(sys.argv[2:]))

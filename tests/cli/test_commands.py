@@ -79,10 +79,10 @@ def test_a_standard_stream_that_is_closed_is_nowhere(words: list[str], status: i
     assert subprocess.run(command, check=False, cwd=tmp_path).returncode == status
 
 
-def test_help_names_every_command_and_each_has_an_example() -> None:
-    everything = subprocess.run(
-        [sys.executable, "-m", "positioner", "--help"], capture_output=True, text=True, check=True
-    ).stdout
+def test_help_names_every_command(capsys: Capture) -> None:
+    with pytest.raises(SystemExit):
+        main(["--help"])
+    everything = capsys.readouterr().out
     assert all(re.search(rf"^ +{name}\b", everything, re.MULTILINE) for name in all_commands())
 
 
@@ -418,19 +418,6 @@ def test_simulate_holds_each_pressure_until_the_next_time(tmp_path: Path) -> Non
     np.testing.assert_array_equal(recording.time_s, [0, 0.5, 1])
     up, down = (0.0645 * 50e3 - 1423.4) / 52538, 1423.4 / 52538
     np.testing.assert_allclose(recording.position_m, [0, up, down], atol=2e-5)
-
-
-def test_play_identifies_and_then_follows(tmp_path: Path, capsys: Capture) -> None:
-    reference = tmp_path / "reference.csv"
-    reference.write_text("time_s,reference_m\n0,0.05\n3,0.035\n6,0.07\n9,0.07\n")
-    words = ["play", "seed", "--reference", str(reference), "--noise-m", "1e-5", "-o", str(tmp_path / "run.csv")]
-    assert main(words) == 0
-    assert "identified b/c = -81" in capsys.readouterr().out
-    recording = read_recording(tmp_path / "run.csv")
-    for end_s, wanted_m in ((2.9, 0.05), (5.9, 0.035), (8.9, 0.07)):
-        at = int(np.searchsorted(recording.time_s, end_s))
-        assert recording.columns["reference_m"][at] == wanted_m
-        assert recording.position_m[at] == pytest.approx(wanted_m, abs=2e-4)
 
 
 def test_play_refuses_a_reference_outside_the_travel(tmp_path: Path, capsys: Capture) -> None:

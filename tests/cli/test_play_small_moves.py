@@ -29,11 +29,12 @@ def played(tmp_path: Path, law: str) -> tuple[np.ndarray, np.ndarray]:
 def test_small_steps_are_made(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
     asked_m, found_m = played(tmp_path, "slides")
     assert np.abs(found_m - asked_m)[1:].max() < 1e-3 * STROKE_M + 5e-5
-    assert "identified b/c" in capsys.readouterr().out
+    assert "identified b/c = -81" in capsys.readouterr().out
 
 
 def test_the_seeds_law_leaves_the_stem_where_it_was(tmp_path: Path) -> None:
     asked_m, found_m = played(tmp_path, "seed")
+    assert found_m[0] == pytest.approx(asked_m[0], abs=2e-4), "a large step it makes"
     assert np.ptp(found_m) < 1e-4
     assert np.abs(found_m - asked_m).max() > 5e-3 * STROKE_M
 

@@ -21,8 +21,9 @@ from tests.workbench.benches import (
     bench,
     benches,
 )
-from workbench.data.imposed_motion import is_imposed, read_imposed
+from workbench.data.imposed_motion import is_imposed, read_imposed, rows_of
 from workbench.diagnosis.diagnosis import diagnose
+from workbench.forces.force_balance import Balance, ForceModel
 from workbench.forces.force_diagnosis import ForceDiagnosis, diagnose_forces
 from workbench.forces.force_diagnosis_json import as_json
 
@@ -114,9 +115,10 @@ def test_friction_that_falls_with_speed_is_found_and_its_opposite_is_refused() -
 def test_a_test_recording_is_judged_and_never_fitted() -> None:
     trained, other = [bench(5e4, 1), bench(2e5, 2)], bench(1e5, 3)
     spoilt = Recording({**other.columns, "load_n": other.columns["load_n"] + 300.0})
-    found, off = (diagnose_forces(trained, VALVE, test=each) for each in (other, spoilt))
-    assert found.base.parameters == off.base.parameters
-    assert off.base.test_rms_n > 10.0 * found.base.test_rms_n
+    rows = (rows_of([*trained, each], VALVE.valve) for each in (other, spoilt))
+    found, off = (Balance(each, VALVE.valve, tested=True).fit_model(ForceModel()) for each in rows)
+    assert found.parameters == off.parameters
+    assert off.test_rms_n > 10.0 * found.test_rms_n
 
 
 def test_an_axis_that_counts_the_other_way_is_turned() -> None:

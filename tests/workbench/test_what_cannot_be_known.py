@@ -8,6 +8,7 @@ import pytest
 
 from config.errors import InputError
 from config.recording import Column, Recording
+from tests.cases import few_always
 from tests.workbench.valves import NOISE_M, SEED
 from workbench.blind.hiding import Hidden, hide
 from workbench.diagnosis.diagnosis import diagnose
@@ -29,12 +30,12 @@ REFUSED: dict[str, tuple[Spoil, str]] = {
     "creeps": (lambda c, noise: {"position_m": 0.03 + 1e-3 * c["time_s"] + noise}, "creeps or moves throughout"),
 }
 UNJUDGED: dict[str, tuple[Spoil, str]] = {
+    "another command": (lambda c, _: {"command_pa": hidden(308).fit.command_pa}, "against its command"),
+    "clocks far apart": (lambda c, _: {"command_pa": np.roll(c["command_pa"], 70)}, "its command"),
     "motion all the time": (
         lambda c, noise: {"position_m": 0.05 + 0.03 * np.sin(2.0 * np.pi * c["time_s"] / 3.0) + noise},
         "against its command",
     ),
-    "another command": (lambda c, _: {"command_pa": hidden(308).fit.command_pa}, "against its command"),
-    "clocks far apart": (lambda c, _: {"command_pa": np.roll(c["command_pa"], 70)}, "its command"),
 }
 
 
@@ -51,7 +52,7 @@ def test_too_few_rests_are_refused_with_what_is_missing(case: str) -> None:
         diagnose(spoilt(spoil), SEED, effects=("preload",), workers=1)
 
 
-@pytest.mark.parametrize("case", UNJUDGED)
+@pytest.mark.parametrize("case", few_always(list(UNJUDGED), 2))
 def test_what_the_command_did_not_do_is_not_judged(case: str) -> None:
     spoil, said = UNJUDGED[case]
     found = diagnose(spoilt(spoil), SEED, effects=("preload",), workers=1)

@@ -7,7 +7,6 @@ A command imports from here what it needs when it runs.
     demo_folder                                 where a demo leaves its files, and whose those there are
     daemon_address, experiment_player           where a daemon is; experiments played on its valve
     valve_test, own_valve                       what tests on the valve share; a valve on a cycle of the command's own
-    hidden_demo                                 `demo --hidden`: an effect found in the daemon's own recording
     csv_series, export_arguments, given_names   series, historian's exports, and names of files in messages
     fit_arguments                               what judges, noise, measured pressure; the recordings read so
     loop_arguments                              the columns of a control loop

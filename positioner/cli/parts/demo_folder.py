@@ -14,20 +14,7 @@ from config.lock_file import take_lock
 from positioner.cli.parts.output_files import make_folder
 from positioner.cli.parts.simulated_plant import SLAVE_HEAD
 
-LEFT = (
-    "slave.toml",
-    "daemon.toml",
-    "recordings",
-    "slides.toml",
-    "slides",
-    "run.png",
-    "hidden.toml",
-    "before.toml",
-    "before",
-    "better.toml",
-    "after.toml",
-    "after",
-)
+LEFT = ("slave.toml", "daemon.toml", "recordings", "slides.toml", "slides", "run.png")
 """What demos leave, beside logs."""
 RECORDINGS = "demo-*.csv"
 """The recordings of a daemon whose valve is called as theirs is."""

@@ -25,8 +25,6 @@ RTU_PERIOD_S = 5e-3
 """On a pseudo-terminal, an exchange takes two silences of 1.75 ms; at 115200 baud a real line adds 4.2 ms."""
 RTU_WINDOW_S = 1.2
 """A fifth of the samples in a second: a longer window, within the rise of the sine, brings k/c back within 1 %."""
-LOCKSTEP_REPLY_TIMEOUT_S = 1.0
-"""Nobody waits for the clock there, so that a reply may take as long as a busy machine needs."""
 STROKE_M = 0.1016
 """Of the seed's valve."""
 RECORDER = '[recorder]\nfolder = "recordings"\n'
@@ -80,9 +78,7 @@ BUSES: dict[str, Callable[[], AbstractContextManager[BusSetup]]] = {"modbus": _m
 
 
 @contextmanager
-def slave_running(
-    bus: str, folder: Path, valve: str, tables: str = "", lockstep_s: float | None = None
-) -> Iterator[tuple[BusSetup, str]]:
+def slave_running(bus: str, folder: Path, valve: str, tables: str = "") -> Iterator[tuple[BusSetup, str]]:
     """Run a slave on a bus as a process; give what the bus puts into the daemon's file, and the slave's ready line.
 
     Args:
@@ -90,19 +86,15 @@ def slave_running(
         folder: of its file and log.
         valve: its valve file, as a slave's file names it.
         tables: more of its file.
-        lockstep_s: the period of one that goes in lockstep with its daemon; None: real time.
     """
     with BUSES[bus]() as setup:
-        clock = f"period_s = {PERIOD_S}" if lockstep_s is None else f'mode = "lockstep"\nperiod_s = {lockstep_s}'
-        path = _write(folder / "slave.toml", _slave_toml(valve, setup.slave, clock, tables))
+        path = _write(folder / "slave.toml", _slave_toml(valve, setup.slave, tables))
         with running("sim", path, *setup.options) as slave:
             yield setup, slave
 
 
 @contextmanager
-def daemon_running(
-    path: Path, setup: BusSetup, slave: str, tables: str = RECORDER, *, lockstep: bool = False
-) -> Iterator[str]:
+def daemon_running(path: Path, setup: BusSetup, slave: str, tables: str = RECORDER) -> Iterator[str]:
     """Run a daemon on a slave's bus as a process; give its ready line.
 
     Args:
@@ -110,19 +102,15 @@ def daemon_running(
         setup: what the bus puts into it.
         slave: the slave's ready line.
         tables: more of its file.
-        lockstep: whether the slave goes in lockstep with it.
     """
-    timeout_s = LOCKSTEP_REPLY_TIMEOUT_S if lockstep else setup.reply_timeout_s
-    reply = "" if timeout_s is None else f"reply_timeout_s = {timeout_s}\n"
-    cycle = reply + ('[cycle]\npace = "device"' if lockstep else f"[cycle]\nperiod_s = {setup.period_s}")
-    with running("run", _write(path, _daemon_toml(setup, slave, cycle, tables))) as daemon:
+    with running("run", _write(path, _daemon_toml(setup, slave, tables))) as daemon:
         yield daemon
 
 
-def _slave_toml(valve: str, bus: str, clock: str, tables: str) -> str:
+def _slave_toml(valve: str, bus: str, tables: str) -> str:
     return f"""{SLAVE_HEAD}valve = "{valve}"
 {bus}[clock]
-{clock}
+period_s = {PERIOD_S}
 [sensor]
 noise_std_m = {NOISE_PU * STROKE_M}
 seed = 1
@@ -139,13 +127,15 @@ static_n = {AGEING * valve.static_n}
 """
 
 
-def _daemon_toml(setup: BusSetup, ready: str, cycle: str, tables: str) -> str:
+def _daemon_toml(setup: BusSetup, ready: str, tables: str) -> str:
+    reply = "" if setup.reply_timeout_s is None else f"reply_timeout_s = {setup.reply_timeout_s}\n"
     return f"""# The daemon of the demo. It knows the stroke; all else it identifies.
 [valve]
 name = "demo"
 stroke_m = {STROKE_M}
 [device]
-{setup.device(ready)}{cycle}
+{setup.device(ready)}{reply}[cycle]
+period_s = {setup.period_s}
 [identification]
 window_s = {setup.window_s}
 [supervisory]

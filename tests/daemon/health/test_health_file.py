@@ -133,7 +133,7 @@ def spoilt_at(content: Any, path: tuple[str | int, ...], value: object) -> str:
     return json.dumps(copied)
 
 
-ODD = (float("inf"), float("nan"), 10**400, 2**52, 1e308, "1", None, [1])
+ODD = (float("nan"), 10**400, 1e308, "1", [1])
 
 
 def test_whatever_stands_in_the_file_is_put_aside_or_gone_on_with_and_served(tmp_path: Path) -> None:

