@@ -13,8 +13,8 @@ import pytest
 from pymodbus.constants import ExcCodes
 
 from config.errors import InputError
-from fieldbus.modbus import connection as connection_module
 from fieldbus.modbus import server as server_module
+from fieldbus.modbus import server_connection
 from fieldbus.modbus.admission import MOST_CLIENTS, ServerLimits
 from fieldbus.modbus.function_codes import RegisterError, Table
 from fieldbus.modbus.server import RegisterServer
@@ -301,7 +301,7 @@ def test_a_host_that_takes_its_places_leaves_those_of_others(bank: Bank) -> None
 
 def test_a_client_that_asks_without_end_is_made_to_wait(bank: Bank, monkeypatch: pytest.MonkeyPatch) -> None:
     waits: list[float] = []
-    monkeypatch.setattr(connection_module, "time", SimpleNamespace(sleep=waits.append, monotonic=time.monotonic))
+    monkeypatch.setattr(server_connection, "time", SimpleNamespace(sleep=waits.append, monotonic=time.monotonic))
     server = RegisterServer(bank, "127.0.0.1", 0, 7, limits=ServerLimits(requests_per_s=10.0))
     server.start()
     try:
@@ -344,7 +344,7 @@ def test_out_of_descriptors_it_waits_before_it_accepts_again(
 
 
 def test_a_client_that_asks_for_nothing_for_too_long_is_disconnected(monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setattr(connection_module, "SEND_TIMEOUT_S", 0.02)
+    monkeypatch.setattr(server_connection, "SEND_TIMEOUT_S", 0.02)
     server = RegisterServer(Bank(), "127.0.0.1", 0, 7, limits=ServerLimits(idle_s=0.5))
     server.start()
     with connection(server) as silent, connection(server) as busy:
