@@ -88,10 +88,10 @@ BREAKAGES = (
     ),
     Breakage(
         "a sensor that stands still while the pressure changes is a fault by default",
-        "positioner/control/lasting_conditions.py",
+        "positioner/control/monitors.py",
         "frozen.unanswered_s > frozen.longest_s,",
         "False,",
-        "tests/control/test_lasting_conditions.py::"
+        "tests/control/test_monitors.py::"
         "test_by_default_a_sensor_that_stands_still_is_a_fault_and_a_slow_cycle_an_alarm",
     ),
     Breakage(

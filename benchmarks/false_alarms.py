@@ -21,10 +21,10 @@ from dataclasses import replace
 import numpy as np
 
 from config.codes import Ne107Cause
-from positioner.daemon.health.packing_tests import TESTS, FoundFriction, PackingLimits, PackingTests
+from positioner.daemon.health.friction_alarms import TESTS, FoundFriction, FrictionAlarms, FrictionLimits
 from positioner.daemon.health.stiction_index import MEMORY
 
-LIMITS = PackingLimits(friction_high=1.5, friction_low=0.5, stiction_limit=0.5, false_alarm_years=100.0)
+LIMITS = FrictionLimits(friction_high=1.5, friction_low=0.5, stiction_limit=0.5, false_alarm_years=100.0)
 COUNTABLE = replace(LIMITS, false_alarm_years=1.0)
 DAY_S, YEAR = 86_400.0, 365.25
 ERROR = 0.05
@@ -70,9 +70,9 @@ def indices(missed: np.ndarray) -> Iterator[float]:
         yield index
 
 
-def false_alarms(found: np.ndarray, missed: np.ndarray, limits: PackingLimits) -> dict[Ne107Cause, int]:
+def false_alarms(found: np.ndarray, missed: np.ndarray, limits: FrictionLimits) -> dict[Ne107Cause, int]:
     """Return how many alarms our tests raise, of frictions found, (days,), and moves missed, (days, MOVES)."""
-    tests, before = PackingTests(limits), frozenset[Ne107Cause]()
+    tests, before = FrictionAlarms(limits), frozenset[Ne107Cause]()
     counts = dict.fromkeys((Ne107Cause.FRICTION_HIGH, Ne107Cause.FRICTION_LOW, Ne107Cause.STICTION), 0)
     bad = np.cumsum(missed.sum(axis=1)).tolist()
     for day, (value, index) in enumerate(zip(found.tolist(), indices(missed), strict=True)):
@@ -127,7 +127,7 @@ def delays(days: int, rng: np.random.Generator) -> Iterator[str]:
     for _ in range(200):
         truth = 1.25 + TIGHTENS * np.arange(200)
         seen, passed = observed(truth, rng), int(np.argmax(truth > LIMITS.friction_high))
-        tests, total = PackingTests(LIMITS), 0.0
+        tests, total = FrictionAlarms(LIMITS), 0.0
         done: dict[str, int] = {}
         for day, value in enumerate(seen.tolist()):
             raised = tests.look(DAY_S * day, FoundFriction(value, ERROR * value), 1.0, (0, 0), 0.0)

@@ -2,7 +2,7 @@
 
 Every register stands at the same address among holding and input registers, so FC3 and FC4 read the same. A value
 of two words is sent most significant word first and is written whole or not at all. Addresses are counted from 0,
-as on the wire; many tools print them from 1.
+as on the wire; many tools print them from 1. `Register.writer` is the role that may write one.
 """
 
 import math

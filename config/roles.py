@@ -1,4 +1,7 @@
-"""Who may do what on a secured connection: each role may also do what those below it may."""
+"""The roles of a secured connection: each may also do what those below it may.
+
+Which role may write a register stands in the table of registers (`config.registers`, `Register.writer`).
+"""
 
 from enum import IntEnum
 

@@ -1,6 +1,7 @@
 """The gate before a page (ASGI): who comes in, from where, and with how much.
 
 - A session comes by the key that stands in the address the command prints, or by the password where there is one.
+  After wrong ones in a row all wait (`config.passwords.SignIn`).
   Every other request, the web socket's too, carries it in a cookie that no script reads (HttpOnly, SameSite).
 - A request that says where it comes from (Origin) comes from this page or is refused: no other site's script acts here.
 - A body is as long as `most_bytes` at most.

@@ -2,6 +2,8 @@
 
     status   fault (bit 3 low)  ->  control 0, then RESET; then ENABLE, LEAVE_HOLD, ACTIVATE  ->  ACTIVE
 
+The node itself is started before, by NMT (`driver.py`).
+
 A node that is not ACTIVE, or is operated locally, is no actuator. A fault of its own is reset once a cycle: the reset
 bit counts when it rises, so it is set in every second control word.
 """

@@ -11,7 +11,8 @@
     poller                          reads a daemon in a thread of its own
     watched_valves                  the valves that somebody looks at, their pollers and connections
     last_moves                      the last minutes as a recording, and the response figures of their steps
-    permissives, valve_commands     what must hold, and what an operator may do, confirmed by what is read back
+    identify_permissives            what must hold before an identification
+    valve_commands                  what an operator may do, confirmed by what is read back
     seen_alarms                     the alarms that are not normal, and what to do about each
     valve_tests                     tests begun by who watches: consent, the command in a process, breaking off
 """

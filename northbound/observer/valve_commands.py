@@ -12,7 +12,7 @@ from config.codes import Fault, Mode, Ne107Cause
 from config.errors import CommandFailed, InputError
 from config.registers import register_named
 from config.roles import Role
-from northbound.observer.permissives import identify_permissives
+from northbound.observer.identify_permissives import identify_permissives
 from northbound.observer.register_words import CODES, code_text
 from northbound.observer.valve_view import ValvePicture
 from northbound.observer.waiting_reference import SAME_PU, WAITS, waiting_reference

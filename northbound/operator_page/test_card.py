@@ -9,7 +9,7 @@ from typing import Any
 from nicegui import ui
 
 from config.roles import Role
-from northbound.observer.permissives import identify_permissives
+from northbound.observer.identify_permissives import identify_permissives
 from northbound.observer.valve_commands import Confirmation, refusal_for
 from northbound.observer.valve_tests import KEPT_AS, TESTS, ValveTests
 from northbound.observer.valve_view import ValvePicture

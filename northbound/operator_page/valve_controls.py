@@ -1,4 +1,7 @@
-"""Signing in, and what a role may then do to a valve; rights and confirmations come from `ValveCommands`."""
+"""Signing in, and what a role may then do to a valve: which button is enabled.
+
+Rights and confirmations come from `ValveCommands`, what an identification needs from `identify_permissives`.
+"""
 
 import time
 from collections.abc import Callable
@@ -11,8 +14,8 @@ from config.passwords import SignIn
 from config.registers import register_named
 from config.role_passwords import WRITERS
 from config.roles import Role
+from northbound.observer.identify_permissives import identify_permissives
 from northbound.observer.last_moves import last_moves
-from northbound.observer.permissives import identify_permissives
 from northbound.observer.valve_commands import EXCITATION, Confirmation, refusal_for
 from northbound.observer.valve_view import TREND_S, ValvePicture
 from northbound.observer.waiting_reference import reference_writer

@@ -30,7 +30,7 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
 
 def run(arguments: argparse.Namespace) -> int:
     """Identify, print what was found, and whether the law uses it now."""
-    from northbound.observer.permissives import IDENTIFY_READS, identify_permissives
+    from northbound.observer.identify_permissives import IDENTIFY_READS, identify_permissives
 
     asked = {
         "alpha": arguments.alpha_pa,

@@ -43,8 +43,8 @@ from positioner.control.controller_memory import (
 from positioner.control.excitation import NOTHING, ActiveExcitation, climbed, excitation_after
 from positioner.control.identifying import identify, progress_of
 from positioner.control.keyword_records import by_name
-from positioner.control.lasting_conditions import MonitorMemory, Needs, after_cycle, needs_of
 from positioner.control.laws.boundary import Law, Seen, seen_of
+from positioner.control.monitors import MonitorMemory, Needs, after_cycle, needs_of
 from positioner.control.played_experiment import PlayedExperiment, Surroundings, experiment_after
 from positioner.control.pressure_clamp import clamped
 from positioner.control.pressure_lead import PathMemory, long_held

@@ -9,8 +9,8 @@ from typing import NamedTuple
 from config.codes import Fault, InhibitReason, Mode, State
 from positioner.control.excitation import ActiveExcitation
 from positioner.control.keyword_records import by_name
-from positioner.control.lasting_conditions import MonitorMemory
 from positioner.control.laws.boundary import Law
+from positioner.control.monitors import MonitorMemory
 from positioner.control.played_experiment import PlayedExperiment
 from positioner.control.pressure_lead import PathMemory
 from positioner.control.reference import Reference

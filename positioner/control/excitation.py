@@ -1,4 +1,6 @@
-"""The excitation under way in S3: a sine as the DCS asks for it, or a staircase of slides, and when it ends.
+"""The excitation under way in S3: which one, and when it ends.
+
+Its pressures are those of `sine_excitation`, as the DCS asks for them, or of `staircase_excitation`.
 
 S3 lasts while eta_1 = 0 in automatic. An excitation that has had its time, or that is not permitted any more
 (`permissives`), or a staircase that came to nothing, has ended: S3 is left, and only eta_1 = 1 makes room for another.

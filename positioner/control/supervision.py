@@ -1,6 +1,8 @@
 """Supervision: did the daemon run, is the measurement fresh and plausible, does the DCS live, who commands?
 
-What must not last, as a sensor that is frozen or a stem away from its reference, is found by `lasting_conditions.py`.
+What one sample shows is judged here, as a measurement that repeats itself (`positioner/daemon/link.py` marks it). What
+must hold for some time is judged in `monitors.py`: a frozen sensor, a jump of the position, a stem away from its
+reference.
 
 It knows nothing of the law. A fault is latched: the mode falls to hold, the safe action commands, and only an
 acknowledgement after its cause is gone frees the way; then a person or the DCS must choose a mode again. A fault whose

@@ -1,7 +1,7 @@
 """The valves of one process, put together from their files: cycles, registers, what is kept, recorded and looked at.
 
 Each line has a thread that cycles, and valves on one line share it. At the end each device is given the command of its
-safe action.
+safe action (`leave`); `positioner.control.settings` says which pressure that is (`safe_pa`).
 """
 
 import logging

@@ -1,8 +1,8 @@
 """How the daemon is told to end, and what else ends it: signals, and threads that died.
 
-Every signal that would kill it and can be caught ends it in the safe state. What cannot be caught (SIGKILL, a crash of
-the interpreter, SIGSTOP, loss of power) is the business of the device's own communication time-out. The signals by
-which a terminal stops a job are not obeyed.
+Every signal that would kill it and can be caught ends it in the safe state (`assembled_valves`, `leave`). What cannot
+be caught (SIGKILL, a crash of the interpreter, SIGSTOP, loss of power) is the business of the device's own
+communication time-out. The signals by which a terminal stops a job are not obeyed.
 """
 
 import logging

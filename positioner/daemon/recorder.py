@@ -47,8 +47,6 @@ class RowSink(Protocol):
         ...
 
 
-"""A row as offered: the columns without the last."""
-
 MOST_WAITING = 20_000
 RETRY_S = 60.0
 """After a new file could not be begun for the age of the old one."""

@@ -1,7 +1,8 @@
 """The daemon, assembled: `positioner run`.
 
 Start: connect, hold the pressure the device has, look whether its measurement can be true, then serve. End (a signal,
-or a thread that died): stop serving, leave each valve in its configured safe state, finish the recordings.
+or a thread that died; `end_signals`): stop serving, leave each valve in its configured safe state
+(`assembled_valves`, `leave`), finish the recordings.
 
 Valves whose cycles need more than one processor are shared among processes, a worker each; this one then serves their
 registers at the one port, and starts a worker anew that has ended (`positioner.daemon.workers`).

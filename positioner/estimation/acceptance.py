@@ -3,7 +3,8 @@
     applied' = accept(applied, estimated)
 
 The two numbers of the law are taken together: each that was asked for must be valid and not too far from the one in
-use, or both stay as they are.
+use, or both stay as they are. Which estimate is too uncertain is said before: of the integrals by `validity`, of a
+whole recording by `batch`.
 
 Friction has two numbers, φ_up and φ_down, with preload and unlike packings (`landings.static_law`):
 

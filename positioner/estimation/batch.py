@@ -1,6 +1,7 @@
 """Identification from a whole record at once: find its motions, fit them by maximum likelihood, check the result.
 
-The daemon's refinement and `positioner estimate` are this one function. What is not known is not guessed:
+The daemon's refinement and `positioner estimate` are this one function. It refuses what is too uncertain, as `validity`
+does for the integrals; `acceptance` decides what the law uses. What is not known is not guessed:
 
 - how the pressure goes between the samples, when nobody says: held (the value at a sample is that of the interval
   before it), held ahead (of the interval after it) or linear; each is fitted and the likeliest taken;

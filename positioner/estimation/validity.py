@@ -1,5 +1,7 @@
 """Standard deviation and validity of what the identifier and the friction means give.
 
+It refuses what is too uncertain; `acceptance` then decides whether the law uses the rest. `batch` has its own checks.
+
 Each estimate f is a function of θ = (a, b, c) with gradient g, and of the filtered means. To first order
 
     var f = g' cov(θ) g + (share of the filters)^2,    and (g' bias(θ))^2 besides for a, b, c, k singly

@@ -24,7 +24,7 @@ from positioner.daemon.alarms.alarm_list import AlarmList
 from positioner.daemon.alarms.alarm_states import Alarm
 from positioner.daemon.health import Health, HealthKeeper, StoredHealth
 from positioner.daemon.health.e_detector import SECONDS_A_YEAR, EDetector, of_a_mean, of_a_share
-from positioner.daemon.health.packing_tests import HOUR_S, FoundFriction, PackingLimits, PackingTests
+from positioner.daemon.health.friction_alarms import HOUR_S, FoundFriction, FrictionAlarms, FrictionLimits
 from positioner.daemon.health.position_limits import PositionLimits
 from positioner.daemon.health.valve_health import HealthSettings
 from positioner.history.kept_tests import last_tested_s
@@ -120,9 +120,9 @@ def test_false_alarms_are_no_more_than_promised_by_count() -> None:
     assert 0 < alarms <= 1.15 * years / 30.0
 
 
-def packing(**limits: float) -> PackingTests:
+def packing(**limits: float) -> FrictionAlarms:
     defaults = {"friction_high": 1.5, "friction_low": 0.5, "stiction_limit": 0.5, "false_alarm_years": 100.0}
-    return PackingTests(PackingLimits(**{**defaults, **limits}))
+    return FrictionAlarms(FrictionLimits(**{**defaults, **limits}))
 
 
 @pytest.mark.parametrize(

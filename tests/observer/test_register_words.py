@@ -6,7 +6,7 @@ import pytest
 
 from config.codes import Code, ExperimentState, Fault, Mode, State, texts
 from config.registers import BY_NAME, REGISTERS
-from northbound.observer.permissives import IDENTIFY_READS, identify_permissives
+from northbound.observer.identify_permissives import IDENTIFY_READS, identify_permissives
 from northbound.observer.register_words import (
     CAUSE_BITS,
     CODES,

@@ -1,4 +1,4 @@
-"""Recordings of a valve with a hidden effect, to try the workbench on.
+"""Recordings of a valve with a hidden effect, to try the workbench on: which effect is hidden, and how strong.
 
     F_c 250 to 1424 N, F_s / F_c 1.05 to 1.35, k_s +-20 %, F_v x 0.5 to 3; all else is the shipped valve's
 

@@ -1,4 +1,4 @@
-"""A trial of a known valve: it answers a command, after a lead-in that is not recorded.
+"""A trial of a known valve: it answers a command, after a lead-in that is not recorded. `hiding` draws the valve.
 
 The lead-in is what precedes the last passage of the command, so that the first passage begins as its repetition does.
 

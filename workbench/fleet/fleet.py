@@ -1,4 +1,4 @@
-"""Fleet: the valves of a manifest, ranked by what their recordings say of them."""
+"""Fleet: the valves of a manifest, ranked by what their recordings say (`valve_complaints`, `ValveCourse.order`)."""
 
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass

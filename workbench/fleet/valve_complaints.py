@@ -1,4 +1,4 @@
-"""A valve's recordings in turn, each held against the model that the one before left; what the valve complains of.
+"""A valve's recordings in turn, each held against the model that the one before left; what it complains of, its rank.
 
 unreadable recording    the model stays
 as before               the model stays

@@ -1,5 +1,7 @@
 """Causes held against each other by the likelihood of PV, each told the output that is on record.
 
+This is the evidence. The verdict comes from it in `loop_diagnosis`, by the numbers of `thresholds`.
+
     friction        PV answers a stem that rests and slips
     linear          PV answers the output itself: tight tuning, or a disturbance that a valve without fault corrects
     nonlinear       PV answers a curve of the output that rises throughout, u, u^2 and u^3: a characteristic

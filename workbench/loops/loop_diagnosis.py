@@ -1,4 +1,7 @@
-"""The verdict on one loop: it sticks (how much), something else (what), or it cannot be told (why, what would tell)."""
+"""The verdict on one loop: it sticks (how much), something else (what), or it cannot be told (why, what would tell).
+
+The evidence comes from `causes`, the limits from `thresholds`.
+"""
 
 from collections.abc import Callable, Mapping
 from dataclasses import asdict, dataclass

@@ -7,7 +7,7 @@ counts over restarts.
     travel_accumulator, stiction_index      how far and how often the stem went; how often it did not
     ne107                                   status and causes
     valve_conditions                        what is looked at once a second: limits, tests that are due, another spring
-    packing_tests, e_detector               friction and stiction, by tests that keep a promise about false alarms
+    friction_alarms, e_detector             friction and stiction, by tests that keep a promise about false alarms
     daily_figures                           how it is used, day by day: histograms, ends, course, leak, supply, air
     position_limits                         limits of the opening, with dead band and delay
     health_keeper, health_file              logs the status, stores the counts

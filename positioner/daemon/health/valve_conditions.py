@@ -1,6 +1,6 @@
 """What is looked at once a second beside the cycle: conditions that are alarms and no faults.
 
-friction, stiction     by tests that keep a promise (`packing_tests`)
+friction, stiction     by tests that keep a promise (`friction_alarms`)
 opening                beyond a limit (`position_limits`)
 model changed          |k_s / k_s of the first identification - 1| > [alarms] model_change
 test overdue           no test on the valve for [alarms] test_interval_days
@@ -19,7 +19,7 @@ from config.travel import Travel
 from positioner.control.controller_memory import Decision
 from positioner.control.sample import Sample
 from positioner.daemon.health.daily_figures import DAY_S
-from positioner.daemon.health.packing_tests import FoundFriction, PackingLimits, PackingTests
+from positioner.daemon.health.friction_alarms import FoundFriction, FrictionAlarms, FrictionLimits
 from positioner.daemon.health.position_limits import SIDES, PositionLimits
 
 
@@ -44,7 +44,7 @@ class KeptConditions(Schema):
 
 
 class PackingFigures(NamedTuple):
-    """What health knows of the packing: see `PackingTests.look`."""
+    """What health knows of the packing: see `FrictionAlarms.look`."""
 
     found: FoundFriction | None
     baseline_pa: float
@@ -55,8 +55,8 @@ class PackingFigures(NamedTuple):
 class ValveConditions:
     """Of one valve, in one thread."""
 
-    def __init__(self, packing: PackingLimits, alarms: AlarmsTable, travel: Travel) -> None:
-        self._packing = PackingTests(packing)
+    def __init__(self, packing: FrictionLimits, alarms: AlarmsTable, travel: Travel) -> None:
+        self._packing = FrictionAlarms(packing)
         self._limits = PositionLimits.of(alarms)
         self._alarms, self._travel = alarms, travel
         self._kept = KeptConditions()

@@ -22,8 +22,8 @@ from positioner.control.requests import Requests
 from positioner.control.sample import Sample
 from positioner.control.travel.cutoffs import WITHIN, sent_to_m
 from positioner.daemon.health.daily_figures import Operation, Turned
+from positioner.daemon.health.friction_alarms import FoundFriction, FrictionLimits
 from positioner.daemon.health.health_file import HealthRecord
-from positioner.daemon.health.packing_tests import FoundFriction, PackingLimits
 from positioner.daemon.health.stiction_index import StictionIndex
 from positioner.daemon.health.travel_accumulator import TravelAccumulator
 from positioner.daemon.health.valve_conditions import PackingFigures, ValveConditions
@@ -99,9 +99,9 @@ class HealthSettings:
         )
 
     @property
-    def packing(self) -> PackingLimits:
+    def packing(self) -> FrictionLimits:
         """The limits of friction and stiction."""
-        return PackingLimits(
+        return FrictionLimits(
             friction_high=self.friction_high,
             friction_low=self.friction_low,
             stiction_limit=self.stiction_limit,

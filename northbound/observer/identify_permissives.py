@@ -1,4 +1,8 @@
-"""What must hold before the valve may be identified, which moves it; `positioner identify` asks the same."""
+"""What must hold before the valve may be identified, which moves it; `positioner identify` asks the same.
+
+The daemon itself refuses by `positioner/control/permissives.py`. Which button a page disables is decided in
+`operator_page/valve_controls.py` (by role and these) and `operator_page/test_card.py` (tests).
+"""
 
 import math
 from collections.abc import Mapping

@@ -1,4 +1,4 @@
-"""Whether friction has left its limits, and whether the stem misses moves: by tests that keep a promise (`e_detector`).
+"""Alarms of friction too high, friction too low and missed moves, by tests that keep a promise (`e_detector`).
 
     friction    an identification's F_c with its deviation, against the limits of [health] times the baseline
     stiction    each move that was asked for, made or missed, against [health] stiction_limit
@@ -42,7 +42,7 @@ class FoundFriction(NamedTuple):
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
-class PackingLimits:
+class FrictionLimits:
     """Limits of friction over its baseline, and of the share of moves missed; 0: none. The promise in years."""
 
     friction_high: float
@@ -51,10 +51,10 @@ class PackingLimits:
     false_alarm_years: float
 
 
-class PackingTests:
-    """All three, in the thread that looks once a second."""
+class FrictionAlarms:
+    """All three alarms, in the thread that looks once a second."""
 
-    def __init__(self, limits: PackingLimits) -> None:
+    def __init__(self, limits: FrictionLimits) -> None:
         self._limits = limits
         years = TESTS * limits.false_alarm_years
         self._high, self._low = (EDetector(years, len(EXCESS_BETS)) for _ in range(2))

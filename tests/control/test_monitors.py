@@ -10,7 +10,7 @@ from config.errors import InputError
 from config.loading import validate
 from config.quantities import DeviceStatus
 from positioner.control.controller_memory import Decision
-from positioner.control.lasting_conditions import (
+from positioner.control.monitors import (
     IN_VAIN,
     UNKNOWN_S,
     MonitorMemory,
