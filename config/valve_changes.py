@@ -14,7 +14,7 @@ from config.valve_file import EffectTable, ValveFile, ValveParameters
 FIXED = ("name", "kind", "actuator")
 
 
-def told_changes(values: Mapping[str, float], without: Collection[str]) -> list[str]:
+def changes_in_words(values: Mapping[str, float], without: Collection[str]) -> list[str]:
     """Return in words what was changed in a valve file."""
     return [f"{name} = {value:g}" for name, value in values.items()] + [f"without {each}" for each in without]
 

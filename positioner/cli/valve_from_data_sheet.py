@@ -71,13 +71,13 @@ def _option(key: str) -> str:
 
 
 def _change_file(arguments: argparse.Namespace) -> int:
-    from config.valve_changes import change_valve, told_changes
+    from config.valve_changes import change_valve, changes_in_words
     from config.valve_file_writer import write_valve
 
     values = dict(map(_read_assignment, arguments.set))
     file = change_valve(read_valve(arguments.of), values, arguments.without)
     require_parameters(file, "--set")
-    said = told_changes(values, arguments.without)
+    said = changes_in_words(values, arguments.without)
     write_valve(arguments.out, file, [f"{arguments.of} with {each}" for each in said])
     print(f"{arguments.out}: {arguments.of} with {', '.join(said) or 'nothing changed'}")
     return 0

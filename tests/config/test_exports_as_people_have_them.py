@@ -75,6 +75,10 @@ PA = (*WORDS[:2], "command_pa=OUT:Pa")
 PREAMBLE = ["Plant 7", "", "Exported: 31.01.2026; user: op", ""]
 
 
+NOON, NIGHT = (datetime.datetime(2026, 1, 31, hour, 59, 50) for hour in (11, 0))
+IN_DIGITS = ExportOptions(time_format="%H%M%S.%f")
+
+
 @dataclass(frozen=True)
 class Good:
     """A file that is read, with what must be said about it."""
@@ -348,6 +352,16 @@ READ = {
     "times with a unit behind each that changes": Good(
         text(rows(time=[f"{1e3 * t:.0f} ms" if t < 1.0 else f"{t:.1f} s" for t in T]))
     ),
+    "times of day in digits": Good(text(rows(time=day(NOON, "%H%M%S.%f"))), options=IN_DIGITS),
+    "times of day in digits, as numbers without zeros in front": Good(
+        text(rows(time=[each.lstrip("0") for each in day(NIGHT, "%H%M%S.%f")])), options=IN_DIGITS
+    ),
+    "seconds that pass what minutes do not": Good(text(rows(time=[f"{t + 50.0:.1f}" for t in T]))),
+    "Julian days": Good(
+        text(rows(time=[f"{2_461_071.99 + t / 86400:.9f}" for t in T])),
+        ("time_s=t:d", *WORDS[1:]),
+        said="recorded: 2026",
+    ),
     "nanoseconds since 1970": Good(
         text(rows(time=[f"{1_772_612_100_000_000_000 + round(5e8 * i)}" for i in range(N)])),
         ("time_s=t:ns", *WORDS[1:]),
@@ -418,6 +432,25 @@ def test_it_is_read_right_and_told(kind: str, tmp_path: Path) -> None:
     assert np.isnan(recording.position_m[missing]).all()
     said = "; ".join(f"{key}: {value}" for key, value in recording.metadata.items())
     assert case.said in said
+
+
+@pytest.mark.parametrize(("share", "is_told"), [(0.01, True), (1.0, False)])
+def test_shares_that_are_said_to_be_per_cent_are_asked_about(share: float, is_told: bool, tmp_path: Path) -> None:
+    path = tmp_path / "export.csv"
+    path.write_bytes(text(rows(pv=[f"{share * x:.4f}" for x in PV])))
+    recording = read_export(path, read_mapping(WORDS), STROKE_M)
+    assert ("if these are shares of 1, position_m=PV:p.u." in str(recording.metadata)) == is_told
+
+
+@pytest.mark.parametrize(
+    ("header", "per_bar"),
+    [("kgf/cm2", 1.0197162), ("N/mm²", 0.1), ("mmHg", 750.06168), ("inH2O", 401.46308), ("atm", 0.98692327)],
+)
+def test_a_unit_in_brackets_is_read_with_its_slash(header: str, per_bar: float, tmp_path: Path) -> None:
+    path = tmp_path / "export.csv"
+    path.write_bytes(text(rows(header=f"t,PV,OUT [{header}]", out=[f"{per_bar * u:.7f}" for u in OUT])))
+    recording = read_export(path, read_mapping((*WORDS[:2], f"command_pa=OUT [{header}]")), STROKE_M)
+    np.testing.assert_allclose(recording.command_pa, 1e5 * OUT, rtol=1e-6)
 
 
 @dataclass(frozen=True)
@@ -581,6 +614,18 @@ REFUSED = {
     "FILETIME, not said": Bad(
         text(rows(time=[f"{134_171_721_000_000_000 + 5_000_000 * i}" for i in range(N)])),
         "type --column time_s=t:100ns, FILETIME",
+    ),
+    "Julian days, not said": Bad(
+        text(rows(time=[f"{2_461_071.99 + t / 86400:.9f}" for t in T])), "type --column time_s=t:d, Julian days"
+    ),
+    "times of day in digits, not said": Bad(
+        text(rows(time=day(NOON, "%H%M%S.%f"))), 'are a time of day: type --time-format "%H%M%S.%f", or'
+    ),
+    "dates and times in digits, not said": Bad(
+        text(rows(time=day(NOON, "%Y%m%d%H%M%S.%f"))), 'are a time of day: type --time-format "%Y%m%d%H%M%S.%f"'
+    ),
+    "the same said to be seconds": Bad(
+        text(rows(time=day(NOON, "%Y%m%d%H%M%S.%f"))), "its digits are a time of day", ("time_s=t:s", *WORDS[1:])
     ),
     "datenum, not said": Bad(
         text(rows(time=[f"{740_046.34375 + t / 86400:.9f}" for t in T])),

@@ -14,6 +14,8 @@ from math import pi
 
 from workbench.imports.number_notation import is_numeral
 
+ATMOSPHERE_PA = 101_325.0
+
 UNITS: Mapping[str, Mapping[str, float]] = {
     "_s": {
         "s": 1.0,
@@ -36,11 +38,16 @@ UNITS: Mapping[str, Mapping[str, float]] = {
         "bar": 1e5,
         "psi": 6894.757293168,
         "kg/cm2": 98066.5,
+        "atm": ATMOSPHERE_PA,
+        "mmHg": 133.322387415,
+        "inHg": 3386.388640341,
+        "mmH2O": 9.80665,
+        "inH2O": 249.08891,
         "bara": 1e5,
         "kPaa": 1e3,
         "psia": 6894.757293168,
     },
-    "_m": {"m": 1.0, "cm": 1e-2, "mm": 1e-3, "um": 1e-6, "in": 0.0254},
+    "_m": {"m": 1.0, "cm": 1e-2, "mm": 1e-3, "um": 1e-6, "in": 0.0254, "mil": 2.54e-5, "ft": 0.3048},
     "_n": {"N": 1.0, "kN": 1e3, "lbf": 4.4482216152605},
     "_nm": {"Nm": 1.0, "mNm": 1e-3, "kNm": 1e3},
     "_a": {"A": 1.0, "mA": 1e-3},
@@ -49,12 +56,12 @@ UNITS: Mapping[str, Mapping[str, float]] = {
     "_rad_per_s": {"rad/s": 1.0, "deg/s": pi / 180.0, "rpm": pi / 30.0},
 }
 """By the ending of our name: their unit in ours."""
-ATMOSPHERE_PA = 101_325.0
 ABSOLUTE = frozenset({"bara", "kPaa", "psia"})
 """Pressures from a vacuum up; ours are from the atmosphere up."""
 SHARES: Mapping[str, tuple[float, float]] = {
     "%": (0.01, 0.0),
     "p.u.": (1.0, 0.0),
+    "‰": (1e-3, 0.0),
     "mA": (1 / 16, -0.25),
     "0-20mA": (1 / 20, 0.0),
     "0-10V": (0.1, 0.0),
@@ -71,6 +78,11 @@ PROCESS_UNITS = re.compile(
 """Of a flow, a temperature and the like, of which no column of ours is."""
 SI = {ending: next(unit for unit, factor in units.items() if factor == 1.0) for ending, units in UNITS.items()}
 _WITH_UNIT = re.compile(r"([+\u2212-]?[\d.,]+(?:[eE][+-]?\d+)?)\s*([^\d\s].*)")
+_BEHIND_NAME = [
+    re.compile(rf"(.*\S)\s*{unit}", re.DOTALL)
+    for unit in (r"[\[(<]\s*([^\[\]()<>]+(?:\([^()]*\))?)\s*[\])>]", r"[,/:]\s*(\S+)", r"\s(%)")
+]
+"""A unit behind a name: in brackets, in which there may be a slash; behind a comma, slash or colon; alone."""
 _ALIASES = {
     "sec secs second seconds sek sekunde sekunden": "s",
     "msec millisec milliseconds millisekunden": "ms",
@@ -90,6 +102,13 @@ _ALIASES = {
     "psig psi(g) lb/in2 lbf/in2": "psi",
     "psi(a)": "psia",
     "kg/cm² kgf/cm2 kgf/cm² kp/cm2": "kg/cm2",
+    "n/mm2 n/mm²": "MPa",
+    "torr": "mmHg",
+    "mmwc mmh₂o mmws": "mmH2O",
+    "inwc inh₂o inwg": "inH2O",
+    "thou 1/1000in": "mil",
+    "foot feet": "ft",
+    "permille promille": "‰",
     "meter metre meters metres": "m",
     "millimeter millimetre": "mm",
     "µm μm micron": "um",
@@ -138,14 +157,15 @@ def unit_in_header(name: str) -> tuple[str, str | None]:
 
     >>> unit_in_header("Hub [mm]"), unit_in_header("P1, bar"), unit_in_header("PV (Ist)")
     (('Hub', 'mm'), ('P1', 'bar'), ('PV (Ist)', None))
+    >>> unit_in_header("OUT [kgf/cm2]"), unit_in_header("v (m/s)")
+    (('OUT', 'kg/cm2'), ('v', 'm/s'))
     >>> unit_in_header("PV:mm")
     ('PV', 'mm')
     """
-    match = re.fullmatch(
-        r"(.*\S)\s*(?:[\[(<]\s*([^\[\]()<>]+(?:\([^()]*\))?)\s*[\])>]|[,/:]\s*(\S+)|\s(%))", name, re.DOTALL
-    )
-    unit = unit_named(match[2] or match[3] or match[4]) if match else None
-    return (match[1].rstrip(), unit) if match and unit else (name, None)
+    for form in _BEHIND_NAME:
+        if (match := form.fullmatch(name)) and (unit := unit_named(match[2])):
+            return match[1].rstrip(), unit
+    return name, None
 
 
 def split_unit(cell: str) -> tuple[str, str | None]:

@@ -48,9 +48,14 @@ BASES = (
     TimeBase("s", 6e8, 3e9, "seconds since 1970", 0.0),
     TimeBase("d", 30_000.0, 80_000.0, "days of a workbook", -2_209_161_600.0, 9e-4),
     TimeBase("d", 726_000.0, 753_000.0, "days since the year 0 (datenum)", -719_529.0 * DAY_S, 9e-4),
+    TimeBase("d", 2_447_000.0, 2_474_000.0, "Julian days", -2_440_587.5 * DAY_S, 9e-4),
 )
 LARGEST_CLOCK_NUMBER = 1e19
 """Numbers of a clock: nanoseconds of 300 years."""
+CALENDAR_DIGITS = (1.99e13, 2.07e13)
+"""Numbers whose digits are a date and a time, 20260131115950: beyond milliseconds since 1970, short of microseconds."""
+LONGEST_DIGITAL_STEP_S = 20.0
+"""Of seconds that count, such a step shows some of 60 to 99, which no time of day has."""
 NEVER_SECONDS = 1e10
 """Numbers from which on a mapping that says another unit is wrong: 300 years of seconds."""
 
@@ -88,6 +93,30 @@ def time_base(times: Column) -> TimeBase | None:
         return None
     first, step = float(finite[0]), float(np.median(np.abs(np.diff(finite))))
     return next((each for each in BASES if each.low < first < each.high and step < each.longest_step), None)
+
+
+def digits_format(times: Column) -> str | None:
+    """Return the format of numbers whose digits are a time of day, with a date or without; None: they count something.
+
+    Without a date a full minute must show it: 115959 is followed by 120000.
+
+    >>> digits_format(np.array([115957.0, 115958.0, 115959.0, 120000.0])), digits_format(np.arange(50.0, 110.0))
+    ('%H%M%S', None)
+    """
+    if times.size < 2:
+        return None
+    whole = np.floor(times)
+    hour, minute, second = whole // 10_000 % 100, whole // 100 % 100, whole % 100
+    if (whole < 0).any() or (hour > 23).any() or (minute > 59).any() or (second > 59).any():
+        return None
+    fraction = ".%f" if (whole != times).any() else ""
+    if CALENDAR_DIGITS[0] < times[0] < CALENDAR_DIGITS[1]:
+        return f"%Y%m%d%H%M%S{fraction}"
+    steps, passed_s = np.diff(whole), np.diff(3600.0 * hour + 60.0 * minute + second)
+    step = float(np.median(np.diff(times)))
+    turns = passed_s[steps > passed_s]
+    is_told = whole.max() < 240_000 and 0.0 < step < LONGEST_DIGITAL_STEP_S and turns.size > 0
+    return f"%H%M%S{fraction}" if is_told and (turns <= 2.0 * max(step, 1.0)).any() else None
 
 
 def clock_by_rows(rows: int, period_s: float) -> Clock:
@@ -139,6 +168,10 @@ def clock_of(
         row = int(beyond.argmax())
         raise InputError(str(path), f"line {samples.lines[row]}: {cells[row]!r} in {theirs!r} is no time")
     said = mapped or _in_header(samples, theirs)
+    if (written := digits_format(raw)) and (said is None or raw[0] > NEVER_SECONDS):
+        problem = f"{cells[0]!r} in {theirs!r} is no time in seconds: its digits are a time of day"
+        counts = "" if has_date(written) else f", or {option}{theirs}:s if it counts"
+        raise InputError(str(path), f'{problem}: type --time-format "{written}"{counts}')
     unit, base = said or "s", time_base(raw)
     if base is None:
         return Clock(raw * UNITS["_s"][unit], None)

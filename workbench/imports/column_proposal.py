@@ -16,7 +16,7 @@ import numpy.typing as npt
 from config.drive import KINDS, VALVE
 from workbench.imports.cell_kinds import begins_number, may_be_clock, numbers_of
 from workbench.imports.cell_units import SHARES, UNITS, ending_of, list_allowed_units, unit_named
-from workbench.imports.column_clock import time_base
+from workbench.imports.column_clock import digits_format, time_base
 from workbench.imports.column_mapping import RANGE_PA
 from workbench.imports.column_names import COMMON, COUNTER, SETPOINT, STATUS, is_called, rank_by_name
 from workbench.imports.column_preview import GOOD, ColumnPreview, find_sign
@@ -253,6 +253,8 @@ def _unit_not_said(ours: str, column: ColumnPreview, decimal: str) -> tuple[str,
     values = numbers_of(column.cells, decimal)
     if ours == "time_s" and (base := time_base(values)):
         return f":{base.unit}", [f"{column.name!r} is taken for {base.words}"]
+    if ours == "time_s" and (written := digits_format(values)):
+        return "", [f'the digits of {column.name!r} are a time of day: --time-format "{written}"']
     if unit := _at_the_end(ours, column.name):
         return f":{unit}", [f"the unit of {column.name!r} is taken from its name: {unit}"]
     if ours == "time_s":

@@ -119,6 +119,8 @@ def _by_format(text: str, time_format: str) -> datetime | None:
     """Return a stamp by a format, or by the format without its fraction; None if neither reads it."""
     plain = _LONG_FRACTION.sub(r"\1", text)
     whole = re.sub(r"[.,:]%f", "", time_format)
+    if whole == "%H%M%S":  # a number has no zeros in front: 01:02:03 is 10203
+        plain = re.sub(r"^\d+", lambda digits: digits[0].zfill(6), plain)
     for words, form in ((plain, time_format), (plain.replace(",", "."), time_format), (plain, whole)):
         try:
             return datetime.strptime(words, form)

@@ -29,6 +29,8 @@ from workbench.imports.column_mapping import Source
 from workbench.imports.number_notation import is_numeral, number
 from workbench.imports.sample_rows import Samples
 
+LEAST_SHARE_TRAVEL = 0.2
+"""Of numbers between 0 and 1: so much is a stem that moves, if they are shares; in % it is hardly any."""
 Scale = tuple[float | None, tuple[float, float]]
 """The stroke, m, and the pressures of 0 % and 100 %, Pa, that shares are of."""
 
@@ -123,6 +125,10 @@ def in_si(path: Path, samples: Samples, source: Source, unit: str, decimal: str,
             f"{samples.header.table.place} {samples.lines[bare]}: {samples.cells[source.theirs][bare]!r} in "
             f"{source.theirs!r} has no unit, and others there are in {' and '.join(own)}: mend the file",
         )
+    low, high = float(np.nanmin(raw)), float(np.nanmax(raw))
+    if plain == "%" and source.name == "position_m" and 0.0 <= low <= high - LEAST_SHARE_TRAVEL and high <= 1.0:
+        told = f"goes from {low:g} to {high:g} %: if these are shares of 1, position_m={source.theirs}:p.u."
+        samples.notes[f"{source.theirs} in %"] = told
     if len(own) < 2:
         return _scale(raw, source, plain, scale, turned=turned)
     samples.notes[f"units of {source.theirs}, each cell by its own"] = ", ".join(

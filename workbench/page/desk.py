@@ -18,7 +18,7 @@ import numpy as np
 
 from config.errors import InputError
 from config.recording import Column, Recording
-from config.valve_changes import told_changes
+from config.valve_changes import changes_in_words
 from config.valve_file import find_valve, load_valve, valve_alone
 from config.valve_file_writer import valve_toml, write_valve
 from sim.effect import written_here
@@ -406,7 +406,7 @@ class Desk:
         beside = [each.path for each in valve.chain if isinstance(each.made, Extended)]
         remarks = list(Journal.beside(beside[-1]).remarks(valve.file.valve.own.length)) if beside else []
         if isinstance(made := valve.made, SetByHand):
-            remarks += [f"{made.before.name} with {each}" for each in told_changes(made.values, made.without)]
+            remarks += [f"{made.before.name} with {each}" for each in changes_in_words(made.values, made.without)]
         return self.plain("".join(f"# {each}\n" for each in remarks) + valve_toml(valve.file))
 
     def clear(self) -> None:
