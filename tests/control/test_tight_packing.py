@@ -99,7 +99,7 @@ def test_a_heavy_stem_that_gives_way_before_it_slides_is_found_within_its_deviat
 
 @pytest.mark.parametrize(
     ("plant", "maximum_pa"),
-    [(seed_valve(3.0, 0.5), 140e3), (heavy_valve(3.0, 0.3), 140e3), (heavy_valve(3.0, 0.3), 420e3)],
+    [(seed_valve(3.0, 0.5), 140e3), (heavy_valve(3.0, 0.3), 420e3)],
 )
 def test_friction_that_has_tripled_is_named_where_the_pressure_does_not_suffice(
     plant: Plant, maximum_pa: float

@@ -16,7 +16,7 @@ from tests.fuzz.inputs import near
 from tests.fuzz.parser import Parser
 
 PARSERS = {**bus_parsers(), **file_parsers()}
-FEWEST, MOST = 30, 1000
+FEWEST, MOST = 20, 500
 LONGEST_S = 1.0
 """Of work for one input, on a busy machine too."""
 MOST_MEMORY_KB = 300_000
@@ -38,7 +38,7 @@ def worked_s(parser: Parser, data: bytes) -> float:
 
 def inputs(parser: Parser) -> int:
     """Return how many inputs a parser gets: by its share, which says how fast it is."""
-    return max(FEWEST, min(MOST, round(50 * parser.share)))
+    return max(FEWEST, min(MOST, round(25 * parser.share)))
 
 
 @pytest.mark.parametrize("name", PARSERS)

@@ -89,9 +89,12 @@ def test_one_pressure_alone_does_not_show_that_friction_grows_with_it() -> None:
     assert not {"pressure_friction", "pressure_power_friction"} & set(found.missing)
 
 
-@pytest.mark.parametrize("bar", few_always(BARS))
+@pytest.mark.parametrize("bar", few_always(BARS, 0))
 def test_at_whichever_pressure_it_is_judged_friction_grows_with_pressure(bar: int) -> None:
-    """At 3 bar it is found second, beside a packing that yields. In proportion to the pressure alone it was refused."""
+    """At 5 bar `make test` sees it above. At 3 bar it is found second, beside a packing that yields.
+
+    In proportion to the pressure alone it was refused.
+    """
     others = [each for each in BARS if each != bar]
     found = diagnose_forces(runs("O-ring", *others), CYLINDER, test=runs("O-ring", bar)[0])
     assert {"pressure_friction", "pressure_power_friction"} & set(found.missing)

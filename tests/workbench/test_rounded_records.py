@@ -5,6 +5,7 @@ import pytest
 
 from benchmarks.searches import Case, posed, true_cost
 from config.recording import Recording
+from tests.cases import few_always
 from tests.workbench.slow_records import once_a_second
 from tests.workbench.valves import SEED
 from workbench.blind.hiding import hide
@@ -50,7 +51,7 @@ def test_the_digits_of_a_file_are_no_rounding(digits: int, told: bool) -> None:
     assert any("is rounded to" in each for each in notes) == told
 
 
-@pytest.mark.parametrize("seed", [180522, 180209, pytest.param(160237, marks=pytest.mark.long)])
+@pytest.mark.parametrize("seed", few_always([180522, 180209, 160237]))
 def test_few_rests_are_rounded_as_the_sensor_does(seed: int) -> None:
     recording, valve, truth = posed(Case("quantisation", seed, "poor"))
     base = fit(recording, valve, workers=1)

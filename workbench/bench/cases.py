@@ -58,7 +58,7 @@ def write_cases(folder: Path, drawn: int, effects: int, first_seed: int, labelle
 
 
 def _drawn(folder: Path, count: int, first_seed: int) -> Iterator[tuple[str, ...]]:
-    for loop in draw_loops(count, cast(Simulate, numba.njit(simulate)), first_seed=first_seed):
+    for loop in draw_loops(count, cast(Simulate, numba.njit(cache=True)(simulate)), first_seed=first_seed):
         truth, path = loop.truth, Path("loops") / f"{loop.truth.seed}.csv"
         (folder / path).parent.mkdir(exist_ok=True)
         columns = np.column_stack([loop.time_s, loop.op_pct, loop.pv, loop.sp])
