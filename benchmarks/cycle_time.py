@@ -8,14 +8,14 @@ each begins, as in real time, with the caches of others' work. Half of the time 
 import statistics
 import tempfile
 import time
-from collections.abc import Callable, Iterator, Sequence
+from collections.abc import Callable, Sequence
 from dataclasses import replace
 from pathlib import Path
 
 from pymodbus.client import ModbusTcpClient
 
 from benchmarks.bus import COMMAND, PUSH_PA, measured, ratio, slave
-from config.codes import Mode
+from config.codes import Mode, State
 from config.daemon_file import DaemonFile
 from config.device import ModbusTcpDevice
 from config.slave_file import SlaveFile
@@ -39,19 +39,22 @@ DAEMON = DaemonFile.model_validate(
 )
 FIRST = Requests(mode=Mode.AUTOMATIC, mode_writes=1, alpha_pa=44e3, beta_pa=13e3)
 TURN_S, RUN_S = 1.0, 8.0
-TARGET_RATIO, TARGET_US = 0.8, 40.0
+TARGET_RATIO = 0.8
 
 
 def report() -> list[str]:
-    """Return lines: rates of the bare loop and the full cycle, their ratio, and the core's time a step."""
+    """Return lines: rates of the bare loop and the full cycle, their ratio, and the core's processor time a step."""
     bare_us, full_us = full_cycle()
-    core_us = sorted(core_alone())
+    core_us = core_alone()
     return [
         f"bare pymodbus, function 23        {1e6 / statistics.median(bare_us):7.0f} cycles/s",
         f"the daemon's full cycle           {1e6 / statistics.median(full_us):7.0f} cycles/s",
         f"ratio                             {ratio(bare_us, full_us)}, target at least {TARGET_RATIO}",
-        f"control core alone                {statistics.fmean(core_us):7.1f} us a step on average, median "
-        f"{statistics.median(core_us):.1f}, 99 % {core_us[int(0.99 * len(core_us))]:.1f} (target below {TARGET_US:g})",
+        *(
+            f"control core alone, {name:14}{statistics.fmean(each):7.1f} us a step on average, median "
+            f"{statistics.median(each):.1f}, 99 % {sorted(each)[int(0.99 * len(each))]:.1f}"
+            for name, each in core_us.items()
+        ),
     ]
 
 
@@ -111,13 +114,14 @@ def full_loop(cycle: Cycle) -> Callable[[], object]:
     return once
 
 
-def core_alone() -> Iterator[float]:
-    """Yield the time of each step of the control core on the samples of a virtual run, us."""
-    controller = Controller(Settings.of(DAEMON), 0.0)
+def core_alone() -> dict[str, list[float]]:
+    """Return what each step of the control core takes on the samples of a virtual run, us: in S3, and under a law."""
+    controller, core_us = Controller(Settings.of(DAEMON), 0.0), {"in S3": [], "under the law": []}
     for sample, requests in virtual_run():
-        start_ns = time.perf_counter_ns()
-        controller.step(sample, requests)
-        yield (time.perf_counter_ns() - start_ns) / 1e3
+        start_ns = time.thread_time_ns()
+        identifies = controller.step(sample, requests).state is State.S3_IDENTIFY
+        core_us["in S3" if identifies else "under the law"].append((time.thread_time_ns() - start_ns) / 1e3)
+    return core_us
 
 
 def core_again(inputs: Sequence[tuple[Sample, Requests]]) -> None:

@@ -157,7 +157,7 @@ def first_memory(settings: Settings, held_pa: float, restored: ValveKnowledge | 
         progress=identification.estimates.progress,
         applied=settings.applied if restored is None else Applied(restored.ratios),
         static_law=statics.law,
-        restoration=Restoration.of(restored, settings.valve),
+        restoration=Restoration.of(restored, settings.valve, settings.limits.stroke_m),
         dead_band_m=settings.dead_band.fixed_m or 0.0,
     )
     return memory_of(
@@ -619,16 +619,15 @@ def _tries_restored(now: Now, mode: Mode) -> bool:
 
 def _restoration(now: Now, applied: Applied, outcome: SlideOutcome | None, mode: Mode) -> Restoration:
     """Return what has become of what was restored; an identification that is applied takes its place."""
-    memory, stroke_m = now.memory, now.settings.limits.stroke_m
-    before = memory.last.restoration
+    memory, before = now.memory, now.memory.last.restoration
     if applied.count != memory.last.applied.count:
         return before.replaced()
     if not before.provisional:
         return before
     rest = memory.statics.detector.rest
     if outcome is None and rest is not None and now.stem_m is not None and _tries_restored(now, mode):
-        return before.where_it_rests(rest.position_m, rest.std_m, memory.wanted_pa, now.sample.now_s, stroke_m)
-    return before.after(outcome, stroke_m)
+        return before.where_it_rests(rest.position_m, rest.std_m, memory.wanted_pa, now.sample.now_s)
+    return before.after(outcome)
 
 
 def _consumed(now: Now, supervision: SupervisionMemory) -> ConsumedRequests:

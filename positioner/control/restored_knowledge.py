@@ -39,12 +39,14 @@ class Restoration:
     """What was restored, and what has become of it.
 
     Attributes:
+        stroke_m: full travel.
         knowledge: None when nothing was.
         valve: the extended valve that the laws work with, if there is one.
         trust: in it.
         ups, downs: landings that agreed.
     """
 
+    stroke_m: float
     knowledge: ValveKnowledge | None = None
     valve: ExtendedValve | None = None
     trust: Restored = Restored.NOTHING
@@ -52,9 +54,9 @@ class Restoration:
     downs: int = 0
 
     @classmethod
-    def of(cls, knowledge: ValveKnowledge | None, valve: ExtendedValve | None) -> "Restoration":
+    def of(cls, knowledge: ValveKnowledge | None, valve: ExtendedValve | None, stroke_m: float) -> "Restoration":
         """Return what has become of it before anything was seen."""
-        return cls(knowledge, valve, Restored.NOTHING if knowledge is None else Restored.PROVISIONAL)
+        return cls(stroke_m, knowledge, valve, Restored.NOTHING if knowledge is None else Restored.PROVISIONAL)
 
     @property
     def provisional(self) -> bool:
@@ -65,11 +67,11 @@ class Restoration:
         """Return what has become of it when the valve is identified anew."""
         return self if self.trust is Restored.NOTHING else replace(self, trust=Restored.REPLACED)
 
-    def after(self, outcome: SlideOutcome | None, stroke_m: float) -> "Restoration":
+    def after(self, outcome: SlideOutcome | None) -> "Restoration":
         """Return what has become of it after what a change of the command did, if that is known now."""
         if outcome is None or not self.provisional or self.knowledge is None:
             return self
-        agrees = _agrees(outcome, self.knowledge, self.valve, stroke_m)
+        agrees = self._agrees(outcome, self.knowledge)
         if agrees is None:
             return self
         if not agrees:
@@ -78,66 +80,47 @@ class Restoration:
         confirmed = ups + downs >= CONFIRMING and min(ups, downs) > 0
         return replace(self, ups=ups, downs=downs, trust=Restored.CONFIRMED if confirmed else self.trust)
 
-    def where_it_rests(
-        self, position_m: float, std_m: float, command_pa: float, now_s: float, stroke_m: float
-    ) -> "Restoration":
+    def where_it_rests(self, position_m: float, std_m: float, command_pa: float, now_s: float) -> "Restoration":
         """Return what has become of it by where the stem rests under a command, whatever brought it there."""
-        if not self.provisional or self.knowledge is None:
-            return self
-        rests = SlideOutcome(now_s, 1, position_m, command_pa, position_m, std_m, moved=False, landing=False)
-        return self.after(rests, stroke_m)
+        return self.after(SlideOutcome(now_s, 1, position_m, command_pa, position_m, std_m, moved=False, landing=False))
 
+    def _agrees(self, outcome: SlideOutcome, knowledge: ValveKnowledge) -> bool | None:
+        """Return whether what a change of the command did agrees with what was restored; None: it does not say."""
+        s, at_m, stroke_m = outcome.direction, outcome.position_m, self.stroke_m
+        lands_m = {each: self._landing_m(outcome, each, knowledge) for each in (s, -s)}
+        should_m = lands_m[s]
+        within_m = _within_m(outcome, should_m, knowledge, stroke_m)
+        if outcome.landing:
+            return abs(at_m - should_m) <= within_m
+        low_m, high_m = (0.0, stroke_m) if self.valve is None else self.valve.stops_m
+        went = s * (at_m - outcome.from_m) > VISIBLE * stroke_m
+        free = low_m + STOP * stroke_m < at_m < high_m - STOP * stroke_m
+        if went and not free:  # onto a stop: it should have come to rest before
+            contradicts = low_m + within_m < should_m < high_m - within_m
+        elif went and s * (should_m - outcome.from_m) > knowledge.shortest_m(s):  # less far than a slide goes
+            contradicts = abs(at_m - should_m) > within_m
+        else:  # so much as a slide from where it rests would go was held
+            contradicts = free and any(
+                d * (to_m - at_m) > MUCH_LONGER * knowledge.shortest_m(d) + within_m for d, to_m in lands_m.items()
+            )
+        return False if contradicts else None
 
-def _agrees(
-    outcome: SlideOutcome, knowledge: ValveKnowledge, valve: ExtendedValve | None, stroke_m: float
-) -> bool | None:
-    """Return whether what a change of the command did agrees with what was restored; None: it does not say."""
-    s, at_m = outcome.direction, outcome.position_m
-    should_m = _landing_m(outcome, s, knowledge, valve, stroke_m)
-    within_m = _within_m(outcome, should_m, s, knowledge, stroke_m)
-    if outcome.landing:
-        return abs(at_m - should_m) <= within_m
-    low_m, high_m = (0.0, stroke_m) if valve is None else valve.stops_m
-    went = s * (at_m - outcome.from_m) > VISIBLE * stroke_m
-    free = low_m + STOP * stroke_m < at_m < high_m - STOP * stroke_m
-    if went and not free:  # onto a stop: it should have come to rest before
-        contradicts = low_m + within_m < should_m < high_m - within_m
-    elif went and s * (should_m - outcome.from_m) > knowledge.shortest_m(s):  # less far than a slide goes
-        contradicts = abs(at_m - should_m) > within_m
-    else:
-        contradicts = free and any(
-            _held_against_m(outcome, d, knowledge, valve, stroke_m) > MUCH_LONGER * knowledge.shortest_m(d) + within_m
-            for d in (1, -1)
+    def _landing_m(self, outcome: SlideOutcome, direction: int, knowledge: ValveKnowledge) -> float:
+        """Return where a slide lands: by the law, corrected by what landings near there missed it by."""
+        balance = LocalBalance(
+            ratios=knowledge.ratios,
+            landings=tuple(knowledge.landings),
+            stroke_m=self.stroke_m,
+            valve=self.valve,
+            now_s=outcome.time_s,
         )
-    return False if contradicts else None
+        lands_m = (knowledge.landing_m if self.valve is None else self.valve.lands_m)(outcome.command_pa, direction)
+        off_pa = balance.pressure_pa(lands_m, direction) - outcome.command_pa
+        return lands_m - off_pa / -knowledge.ratios.b_over_c
 
 
-def _held_against_m(
-    outcome: SlideOutcome, direction: int, knowledge: ValveKnowledge, valve: ExtendedValve | None, stroke_m: float
-) -> float:
-    """Return how far a slide from where the stem rests would go in a direction, m."""
-    return direction * (_landing_m(outcome, direction, knowledge, valve, stroke_m) - outcome.position_m)
-
-
-def _landing_m(
-    outcome: SlideOutcome, direction: int, knowledge: ValveKnowledge, valve: ExtendedValve | None, stroke_m: float
-) -> float:
-    """Return where a slide lands: by the law, corrected by what landings near there missed it by."""
-    balance = LocalBalance(
-        ratios=knowledge.ratios,
-        landings=tuple(knowledge.landings),
-        stroke_m=stroke_m,
-        valve=valve,
-        now_s=outcome.time_s,
-    )
-    lands_m = (knowledge.landing_m if valve is None else valve.lands_m)(outcome.command_pa, direction)
-    off_pa = balance.pressure_pa(lands_m, direction) - outcome.command_pa
-    return lands_m - off_pa / -knowledge.ratios.b_over_c
-
-
-def _within_m(
-    outcome: SlideOutcome, should_m: float, direction: int, knowledge: ValveKnowledge, stroke_m: float
-) -> float:
+def _within_m(outcome: SlideOutcome, should_m: float, knowledge: ValveKnowledge, stroke_m: float) -> float:
+    """Return how far off what should be a landing may be."""
     still_m = SAT_STILL * knowledge.friction_m
-    std_m = hypot(knowledge.deviation_m(should_m, direction), still_m, outcome.std_m)
+    std_m = hypot(knowledge.deviation_m(should_m, outcome.direction), still_m, outcome.std_m)
     return max(DEVIATIONS * std_m, AGREEING_STROKE_SHARE * stroke_m)

@@ -52,8 +52,10 @@ def test_what_is_guessed_is_given_up_at_once() -> None:
     assert held.likely_m > 3e-3
 
 
-def test_what_is_far_longer_than_broke_loose_says_nothing() -> None:
-    assert KNOWN.breaking(10e-3) == KNOWN
+@pytest.mark.parametrize("sent_m", [9e-3, 10e-3, 11e-3])
+def test_what_is_far_longer_than_broke_loose_says_nothing_wherever_it_was_sent(sent_m: float) -> None:
+    went = Went(sent_m, 10e-3, moved=True, arrived=sent_m == 10e-3)
+    assert KNOWN.taught(went, turning=True) == KNOWN
 
 
 def test_what_held_is_followed_by_no_more_than_twice_as_much() -> None:

@@ -13,6 +13,7 @@ loose. What a slide sent by a way a taught, that went b:
     it fell short, having turned      held = a: the packing gave way
     it fell short, going on           nothing: friction has grown, which the balance learns
     it was not seen to its end        nothing
+    it went twice as far as broke     nothing, wherever it was sent
 
 The interval shrinks by that. It widens by contradiction: where a way holds though so short a one has broken loose, d
 lies within `RAISE` of it, to either side; a way that breaks loose though so long a one has held makes held a little
@@ -42,7 +43,7 @@ FADES, FADED = 0.999, 0.5
 """Factor on held with each slide that breaks loose, so that a shorter way is tried again after some hundred; share of
 broke to which it fades, and no farther."""
 LONG = 2.0
-"""Times broke: a slide longer than this says nothing."""
+"""Times broke: a slide longer than this says nothing; where it missed, the balance was known amiss."""
 
 
 class Went(NamedTuple):
@@ -83,8 +84,6 @@ class Interval:
 
     def breaking(self, way_m: float) -> "Interval":
         """Return it after a way, m, that broke loose."""
-        if way_m > LONG * self.broke_m:
-            return self
         broke_m = min(self.broke_m, way_m)
         held_m = min(self.held_m, max(FADES * self.held_m, FADED * broke_m))
         if way_m <= self.held_m:
@@ -101,10 +100,12 @@ class Interval:
 
     def taught(self, went: Went, *, turning: bool) -> "Interval":
         """Return it after a slide."""
-        if went.arrived:
-            return self.breaking(went.went_m)
         if not went.moved:
             return self.holding(went.sent_m)
+        if went.went_m > LONG * self.broke_m:
+            return self
+        if went.arrived:
+            return self.breaking(went.went_m)
         if went.went_m < went.sent_m:
             return self.holding(went.sent_m) if turning else self
         return self.holding(went.sent_m).breaking(went.went_m)

@@ -30,7 +30,7 @@ class Bench:
     def __init__(self, folder: Path) -> None:
         self.stored = StoredMemory.in_folder(folder, "FV-1", NOW)
         self.knowledge: ValveKnowledge | None = None
-        self.restoration, self.count = Restoration.of(self.stored.kept.knowledge, None), 0
+        self.restoration, self.count = Restoration.of(self.stored.kept.knowledge, None, 0.1), 0
         self.keeper = MemoryKeeper(self.stored, "FV-1", self.decided, lambda: self.knowledge, lambda: 0.0)
 
     def decided(self) -> Decision:
