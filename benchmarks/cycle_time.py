@@ -116,7 +116,8 @@ def full_loop(cycle: Cycle) -> Callable[[], object]:
 
 def core_alone() -> dict[str, list[float]]:
     """Return what each step of the control core takes on the samples of a virtual run, us: in S3, and under a law."""
-    controller, core_us = Controller(Settings.of(DAEMON), 0.0), {"in S3": [], "under the law": []}
+    controller = Controller(Settings.of(DAEMON), 0.0)
+    core_us: dict[str, list[float]] = {"in S3": [], "under the law": []}
     for sample, requests in virtual_run():
         start_ns = time.thread_time_ns()
         identifies = controller.step(sample, requests).state is State.S3_IDENTIFY
