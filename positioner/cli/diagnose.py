@@ -143,10 +143,10 @@ def _tell_experiment(diagnosis: "Diagnosis", path: Path | None) -> None:
     if diagnosis.experiment is None:
         return
     if path is None:
-        print("--experiment FILE writes an experiment that tells the rivals apart")
+        print("--experiment FILE writes the experiment")
         return
     diagnosis.experiment.write(path)
-    print(f"{path}: the experiment that tells the rivals apart")
+    print(f"{path}: the experiment")
 
 
 def _require_out(arguments: argparse.Namespace) -> None:

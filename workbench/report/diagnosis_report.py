@@ -275,8 +275,8 @@ def _next(diagnosis: Diagnosis, commands: Sequence[str]) -> page.Html:
         "What to do next",
         page.text(
             f"Play this command to the valve: {chosen.name}. Of a menu of commands it tells the rivals apart best: "
-            f"even refitted to the answer, the wrong rival leaves an error of {chosen.separation:.3g} times the "
-            "sensor's noise. It stays within the pressures of the recording and begins at rest.",
+            f"refitted to the answer, the wrong rival leaves an error of {chosen.separation:.3g} times the sensor's "
+            "noise, the right one about 1. It stays within the pressures of the recording and begins at rest.",
         ),
         page.plot(
             "plot-experiment",

@@ -312,7 +312,7 @@ class Rule(NamedTuple):
 
 WAITS = (InhibitReason.NOT_AT_REST, InhibitReason.PRESSURE_ELSEWHERE)
 CUT_SHORT, ENDED = (NOTHING, InhibitReason.LAW_BEYOND_LIMITS), (InhibitReason.TRIM_ENDED,)
-HELD = "three slides in a row held it, one of the whole way did, or it is stuck"
+HELD = "the stem did not move in three slides in a row, or in one of the whole way, or it is already stuck"
 BARS = (InhibitReason.LAW_BEYOND_LIMITS, *ENDED, InhibitReason.EXCURSION_BEYOND_LIMIT)
 MOVING: tuple[Rule, ...] = (
     Rule(gone_far_enough, (Sliding,), CUT_SHORT, "Out: the stem is far enough beyond the reference"),
@@ -321,7 +321,7 @@ MOVING: tuple[Rule, ...] = (
 )
 AT_REST: tuple[Rule, ...] = (
     Rule(there, (Idle,), (NOTHING,), "the stem is within the dead band"),
-    Rule(as_near_as_slides_land, (Idle,), ENDED, "slides leave no smaller error, or the stem is on its stop"),
+    Rule(as_near_as_slides_land, (Idle,), ENDED, "more slides would not reduce the error, or the stem is on its stop"),
     Rule(one_slide, (Sliding,), CUT_SHORT, "the error exceeds the break-away distance"),
     Rule(preslid, (Presliding,), (InhibitReason.PRESLIDING,), "presliding reaches the reference"),
     Rule(taken_back, (Idle,), (InhibitReason.REFERENCE_COMES,), "coming references will reduce the error"),
