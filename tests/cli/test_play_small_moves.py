@@ -19,7 +19,8 @@ def played(tmp_path: Path, law: str) -> tuple[np.ndarray, np.ndarray]:
     rows = [f"{HOLD_S * index},{value}" for index, value in enumerate((*STEPS_M, STEPS_M[-1]))]
     reference.write_text("\n".join(["time_s,reference_m", *rows, ""]))
     out = tmp_path / f"{law}.csv"
-    words = ["play", "seed", "--reference", str(reference), "--law", law, "--noise-m", "1e-5", "-o", str(out)]
+    words = ["play", "seed", "--reference", str(reference), "--law", law, "--noise-m", "1e-5"]
+    words += ["--period-s", "5e-3", "-o", str(out)]
     assert main(words) == 0
     columns = read_recording(out).columns
     ends = np.searchsorted(columns["time_s"], HOLD_S * np.arange(1, len(STEPS_M) + 1) - 1e-3)
