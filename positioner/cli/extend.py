@@ -10,7 +10,7 @@ from positioner.cli.parts.model_arguments import read_valve, require_effects
 from positioner.cli.parts.output_files import writable, write_json
 from positioner.cli.parts.progress import at_work
 
-HELP = "add effects to a valve file, fit it, and print the error before and after"
+HELP = "add effects to a valve file, fit the valve, and print the error before and after"
 EXAMPLE = "positioner extend seed --effect backlash --fit rec.csv -o new.toml"
 
 

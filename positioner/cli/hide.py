@@ -20,7 +20,7 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
     parser.add_argument(
         "-o", "--out", type=Path, metavar="DIR", help="folder for fit.csv, test.csv, valve.toml and sealed.json"
     )
-    parser.add_argument("--effects", type=int, choices=(0, 1, 2), default=1, help="number of hidden effects")
+    parser.add_argument("--effects", type=int, choices=(0, 1, 2), default=1, help="how many effects are hidden")
     parser.add_argument(
         "--dirty",
         action="store_true",

@@ -11,8 +11,11 @@ from positioner.cli.parts.daemon_address import add_connection, connect_dcs
 if TYPE_CHECKING:
     from positioner.dcs import Dcs
 
-HELP = "measure spring and friction of the valve (moves the valve); the mode must be automatic"
-EXAMPLE = "positioner identify"
+HELP = (
+    "measure spring and friction of the valve; moves it up and down inside [excitation] travel_window, "
+    "for seconds to minutes; the mode must be automatic"
+)
+EXAMPLE = "positioner set mode automatic && positioner identify"
 
 
 def add_arguments(parser: argparse.ArgumentParser) -> None:
@@ -20,10 +23,10 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
     parser.add_argument(
         "--alpha-pa",
         type=float,
-        help="mean pressure, if [excitation] kind is a sine; 0: the pressure that holds the stem",
+        help="only for [excitation] kind sine: mean pressure; 0: the pressure that holds the stem",
     )
-    parser.add_argument("--beta-pa", type=float, help="amplitude of a sine")
-    parser.add_argument("--omega-rad-per-s", type=float, help="angular frequency of a sine")
+    parser.add_argument("--beta-pa", type=float, help="only for a sine: amplitude")
+    parser.add_argument("--omega-rad-per-s", type=float, help="only for a sine: angular frequency")
     parser.add_argument("--timeout-s", type=float, default=600.0, help="give up after this many seconds")
     add_connection(parser)
 

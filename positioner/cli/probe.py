@@ -20,7 +20,7 @@ BURST = 50
 def add_arguments(parser: argparse.ArgumentParser) -> None:
     """Declare the command line."""
     add_config(parser)
-    parser.add_argument("--valve", help="name of the valve, where the file has several")
+    parser.add_argument("--valve", help="its name, where the daemon's file has several")
     parser.add_argument("--count", type=int, default=0, help="number of lines; 0: until Ctrl-C")
 
 

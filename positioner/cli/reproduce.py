@@ -10,7 +10,7 @@ from config.errors import InputError
 from positioner.cli.parts.clone_only import benchmark
 from positioner.cli.parts.output_files import make_folder
 
-HELP = "print figures and claims of the paper behind this project, in two minutes; needs a clone"
+HELP = "print figures and claims of the paper behind this project, in two minutes; only in a clone of the project"
 EXAMPLE = "positioner reproduce --out figures --json reproduced.json"
 
 
