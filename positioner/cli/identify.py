@@ -15,7 +15,7 @@ HELP = (
     "measure spring and friction of the valve; moves it up and down inside [excitation] travel_window, "
     "for seconds to minutes; the mode must be automatic"
 )
-EXAMPLE = "positioner set mode automatic && positioner identify"
+EXAMPLE = "positioner identify   # after `positioner set mode automatic`"
 
 
 def add_arguments(parser: argparse.ArgumentParser) -> None:
