@@ -26,7 +26,7 @@ def with_noise(recording: Recording, noise_pa: float) -> Recording:
 
 @pytest.fixture(scope="module")
 def sound() -> Hidden:
-    return hide(90001, effects=0, pressure=True)
+    return hide(90001, effects=0, pressure=True, duration_s=15.0)
 
 
 @pytest.fixture(scope="module")
