@@ -14,7 +14,7 @@ from positioner.estimation.landings.landing_detector import SlideOutcome
 from positioner.estimation.landings.stem_at_rest import Rest
 
 
-@dataclass(kw_only=True)
+@dataclass(frozen=True, kw_only=True)
 class Now:
     """m, s."""
 
