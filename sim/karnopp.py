@@ -14,6 +14,10 @@
                                                      sigma F_e > F_s: viscous friction outweighs the Stribeck
                                                      drop, both laws point at the border -> it creeps at v = sigma dz
 
+In BREAKING a stem on a stiffness K = -dF_e/dx, from an excess E0, with a force that grows at a rate R, is no faster
+than E0 / sqrt(K m) + 2 R / K. Where that is less than dz it never slips but breaks and sticks in turn, on a stop some
+thousand times a second: over a step that is long to this it creeps, and ends in balance, |F_e| = F_s (`creep`).
+
 x stem position, m; v velocity, m/s; p actuator pressure, Pa; t time, s; the command u, Pa, is held over a period.
 A period is cut into equal steps h, and these where the pressure jumps or bends (`straight`). Over a step it goes
 straight from its start to its end value; inside it every change of mode is found to h / 2^30, and the motion is
@@ -34,8 +38,9 @@ is solved exactly, however stiff, by the response g to an impulse (g(0) = 0, g'(
 
 for n = n_0 + n_1 tau / s + n_2 (tau / s)^2. On the bare valve beyond the Stribeck range n is a straight line: there a
 step has no error. The error estimate is what the quadratic term changes of v. Where that is too much, another force may
-damp the stem, and lambda = -dv'/dv, there, if that is more, is tried before the sub-step is halved: n then lacks that
-damping too, and is as smooth. Of a stem damped so, steps are exponential down to DAMPED / lambda.
+damp the stem, drive it or stiffen it: lambda = -dv'/dv and kappa = -dv'/dx, there (`linear_at`), are tried before the
+sub-step is halved: n then lacks that force too, and is as smooth. Of a stem damped so, steps are exponential down to
+DAMPED / lambda.
 
 The file is plain Python and runs as it stands: the bare valve. `sim.kernel` compiles this text, and in place of the
 functions at its end, which stand empty here, those that the effects of a valve file fill. All that is compiled must
@@ -43,7 +48,7 @@ stand in this file or in an effect's own: a kernel is cached under the digest of
 """
 
 # ruff: noqa: ARG001 -- an empty place takes what a full one needs.
-from math import ceil, cos, exp, nan, sin, sqrt
+from math import ceil, cos, exp, nan, pi, sin, sqrt
 from typing import Any, NamedTuple
 
 import numpy as np
@@ -66,14 +71,18 @@ SHORTEST_SUBSTEP = 2.0**-20
 EXPONENTIAL_ANGLE = 0.15
 """Angle, rad, of the undamped stem from which a sub-step is exponential: below it the pair is cheaper, and the closed
 form cancels."""
-MORE, DAMPED = 1.1, 0.5
-"""Damping, over that tried, that is worth another trial; lambda s from which a sub-step is exponential then."""
+OTHER, DAMPED = 0.1, 0.5
+"""Difference of damping, of that tried, that is worth another trial; lambda s from which a sub-step is exponential
+then."""
 FIRST_CHANGE = 0.2
 """Change of v, in |v| + v_s, that the first sub-step in the Stribeck range is made for: longer ones are refused."""
 BISECTIONS = 30
 NINTH = 1.0 / 9.0
 NEGLIGIBLE = 40.0
 """(v / v_s)^2 beyond which exp(-(v / v_s)^2) < 5e-18 is lost in the rounding of F_c."""
+CREEP_ANGLE = 2.0 * pi
+"""Angle, rad, of the undamped stem in a step from which one that gives way is in balance at the end: once round. On a
+stop it turns through 15 in 2 ms, on its spring alone through 2 in 10 ms."""
 BREAKAWAY_FACTOR = 1.0 + 1e-10
 """F_s at break-away, in F_s at the end of a creep. Were they one, a stem pressed on a stop would creep for ever."""
 DIFFERENCE_M = 1e-7
@@ -154,6 +163,13 @@ def external_force(valve: Karnopp, stem: Stem, q: Any, z: Any) -> float:
     return valve.A * stem.p - valve.k_s * stem.x + force(0.0, stem, q, z)
 
 
+def stiffness_at(valve: Karnopp, stem: Stem, q: Any, z: Any) -> float:
+    """-dF_e/dx, N/m, with all effects."""
+    ahead = external_force(valve, Stem(stem.t, stem.x + DIFFERENCE_M, stem.v, stem.p), q, z)
+    behind = external_force(valve, Stem(stem.t, stem.x - DIFFERENCE_M, stem.v, stem.p), q, z)
+    return (behind - ahead) / (2.0 * DIFFERENCE_M)
+
+
 def excess(valve: Karnopp, stem: Stem, q: Any, z: Any) -> float:
     """|F_e| - F_s, N, but for BREAKAWAY_FACTOR: positive when the stuck stem breaks away."""
     F_e = external_force(valve, stem, q, z)
@@ -208,6 +224,15 @@ def bogacki_shampine(
     return x1, v1, a1, s * 0.125 * NINTH * abs(5.0 * a - 6.0 * a2 - 8.0 * a3 + 9.0 * a1)
 
 
+class Linear(NamedTuple):
+    """What is linear of a slide, x'' + lambda x' + kappa x = n."""
+
+    damping: float
+    """lambda, 1/s."""
+    kappa: float
+    """1/s^2."""
+
+
 class Response(NamedTuple):
     """Of x'' + lambda x' + kappa x = n: g, g', h of an impulse after s; I_0, I_1, I_2 of n = 1, tau / s, its square."""
 
@@ -243,16 +268,31 @@ def response(damping: float, kappa: float, s: float, g: float, slope: float) -> 
     return Response(g, slope, h, I_0, I_1, (1.0 - 2.0 * (I_0 * per_s + damping * I_1) * per_s) * per_kappa)
 
 
-def damping_at(valve: Karnopp, sigma: float, stem: Stem, a: float, q: Any, z: Any) -> float:
-    """Return lambda, 1/s, of a sliding stem with v' = a: of all that damps it; negative in the Stribeck range."""
-    dv = sigma * DIFFERENCE_V * (abs(stem.v) + valve.v_s)
+def linear_at(valve: Karnopp, sigma: float, stem: Stem, a: float, q: Any, z: Any) -> Linear:
+    """Return lambda and kappa, there, of a sliding stem with v' = a: negative in the Stribeck range, or of a load."""
+    dv, dx = sigma * DIFFERENCE_V * (abs(stem.v) + valve.v_s), sigma * DIFFERENCE_M
     faster = acceleration(valve, SLIP, sigma, Stem(stem.t, stem.x, stem.v + dv, stem.p), q, z)
-    return (a - faster) / dv
+    farther = acceleration(valve, SLIP, sigma, Stem(stem.t, stem.x + dx, stem.v, stem.p), q, z)
+    kappa = (a - farther) / dx
+    own = valve.k_s * valve.per_m
+    return Linear((a - faster) / dv, kappa if kappa > OTHER * own else own)
+
+
+def unlike(there: Linear, tried: Linear) -> bool:
+    """Whether what is linear there is worth another trial."""
+    damped = abs(there.damping - tried.damping) > OTHER * abs(tried.damping)
+    return damped or abs(there.kappa - tried.kappa) > OTHER * tried.kappa
+
+
+def shorter(shortest: float, there: Linear) -> float:
+    """Return the sub-step, s, from which one is exponential, with what is linear there."""
+    shortest = min(shortest, EXPONENTIAL_ANGLE / sqrt(there.kappa))
+    return min(shortest, DAMPED / there.damping) if there.damping > 0.0 else shortest
 
 
 def exponential_step(
     valve: Karnopp,
-    damping: float,
+    linear: Linear,
     sigma: float,
     drive: Drive,
     tau: float,
@@ -264,7 +304,7 @@ def exponential_step(
     z: Any,
 ) -> tuple[float, float, float, float]:
     """Slide over s from (x, v) with v' = a; return x, v, v' at its end and what the quadratic term changes of v."""
-    kappa = valve.k_s * valve.per_m
+    damping, kappa = linear
     g, slope = impulse(damping, kappa, 0.5 * s)
     half = response(damping, kappa, 0.5 * s, g, slope)
     # Twice the half is the whole.
@@ -288,13 +328,17 @@ def exponential_step(
 
 def wait(
     valve: Karnopp, drive: Drive, tau: float, h: float, x: float, sigma: float, q: Any, z: Any
-) -> tuple[float, int, float]:
-    """Hold the stuck stem until it breaks away or the step ends; return tau, mode, sigma."""
+) -> tuple[float, float, int, float]:
+    """Hold the stuck stem until it breaks away or the step ends, or let it creep; return tau, x, mode, sigma."""
     at_end = excess(valve, stem_at(drive, h, x, 0.0), q, z)
     if not at_end > 0.0:
-        return h, STUCK, sigma + unknown(at_end)
+        return h, x, STUCK, sigma + unknown(at_end)
+    begun = max(excess(valve, stem_at(drive, tau, x, 0.0), q, z), 0.0)
+    crept = creep(valve, stem_at(drive, h, x, 0.0), h - tau, begun, at_end, q, z)
+    if crept != 0.0:
+        return h, x + crept, STUCK, sigma
     late = h
-    if excess(valve, stem_at(drive, tau, x, 0.0), q, z) > 0.0:
+    if begun > 0.0:
         late = tau
     else:
         early = tau
@@ -305,7 +349,23 @@ def wait(
             else:
                 early = middle
     way = 1.0 if external_force(valve, stem_at(drive, late, x, 0.0), q, z) > 0.0 else -1.0
-    return late, BREAKING, way + unknown(sigma)
+    return late, x, BREAKING, way + unknown(sigma)
+
+
+def creep(valve: Karnopp, stem: Stem, s: float, begun: float, at_end: float, q: Any, z: Any) -> float:
+    """Return by how much, m, a stuck stem gives way within s without leaving the band; 0 of one that breaks loose.
+
+    Its excess is `begun` at the beginning and `at_end` at the end, N, where it stays.
+    """
+    K = stiffness_at(valve, stem, q, z)
+    if not K * valve.per_m * s * s > CREEP_ANGLE * CREEP_ANGLE:
+        return 0.0
+    fastest = begun * sqrt(valve.per_m / K) + 2.0 * (at_end - begun) / (K * s)
+    if not fastest < valve.dz:
+        return 0.0
+    crept = at_end / K if external_force(valve, stem, q, z) > 0.0 else -at_end / K
+    left = excess(valve, Stem(stem.t, stem.x + crept, 0.0, stem.p), q, z)
+    return crept if abs(left) < BORNE * valve.F_s else 0.0
 
 
 def move(
@@ -326,8 +386,8 @@ def move(
     s = h - tau
     if v * v < NEGLIGIBLE * valve.v_s * valve.v_s and abs(a) * s > FIRST_CHANGE * (abs(v) + valve.v_s):
         s = max(FIRST_CHANGE * (abs(v) + valve.v_s) / abs(a), SHORTEST_SUBSTEP * s)
-    damping = valve.F_v * valve.per_m
-    shortest_exponential = EXPONENTIAL_ANGLE / sqrt(valve.k_s * valve.per_m)
+    linear = Linear(valve.F_v * valve.per_m, valve.k_s * valve.per_m)
+    shortest_exponential = EXPONENTIAL_ANGLE / sqrt(linear.kappa)
     tried = 0
     while tau < h:
         tried += 1
@@ -335,14 +395,14 @@ def move(
             return h, nan, nan, False
         exponential = mode == SLIP and s > shortest_exponential
         if exponential:
-            x1, v1, a1, error = exponential_step(valve, damping, sigma, drive, tau, s, x, v, a, q, z)
+            x1, v1, a1, error = exponential_step(valve, linear, sigma, drive, tau, s, x, v, a, q, z)
         else:
             x1, v1, a1, error = bogacki_shampine(valve, mode, sigma, drive, tau, s, x, v, a, q, z)
         allowed = tolerance * (abs(v1) + valve.v_s)
         if error > allowed and s > SHORTEST_SUBSTEP * h:
-            there = damping_at(valve, sigma, stem_at(drive, tau, x, v), a, q, z) if exponential else damping
-            if there > MORE * damping:
-                damping, shortest_exponential = there, min(shortest_exponential, DAMPED / there)
+            there = linear_at(valve, sigma, stem_at(drive, tau, x, v), a, q, z) if exponential else linear
+            if unlike(there, linear):
+                linear, shortest_exponential = there, shorter(shortest_exponential, there)
             else:
                 s *= 0.5
             continue
@@ -431,7 +491,7 @@ def step(
             left = excess(valve, stem_at(drive, tau, x, 0.0), q, z)
             return (x, 0.0, STUCK, 0.0) if abs(left) < BORNE * valve.F_s else (nan, nan, SLIP, sigma)
         if mode == STUCK:
-            tau, mode, sigma = wait(valve, drive, tau, h, x, sigma, q, z)
+            tau, x, mode, sigma = wait(valve, drive, tau, h, x, sigma, q, z)
             continue
         tau, x, v, over = move(valve, mode, sigma, drive, tau, h, x, v, tolerance, q, z)
         if over and mode == SLIP:
@@ -448,9 +508,7 @@ def step(
 
 def settle(valve: Karnopp, stem: Stem, q: Any, z: Any) -> tuple[float, float]:
     """Let the motion place have its say at the end of a step; return x, v."""
-    ahead = external_force(valve, Stem(stem.t, stem.x + DIFFERENCE_M, stem.v, stem.p), q, z)
-    behind = external_force(valve, Stem(stem.t, stem.x - DIFFERENCE_M, stem.v, stem.p), q, z)
-    stiffness = (behind - ahead) / (2.0 * DIFFERENCE_M)
+    stiffness = stiffness_at(valve, stem, q, z)
     return motion(stem.x, stem.v, external_force(valve, stem, q, z), stiffness, stem, q, z)
 
 

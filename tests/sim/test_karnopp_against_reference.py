@@ -127,23 +127,59 @@ def test_an_exponential_step_through_a_bent_force_is_checked() -> None:
     assert off_by_exponential_m(bent) < 5e-6
 
 
-def test_a_force_that_damps_the_stem_takes_as_few_sub_steps_as_viscous_friction(
-    monkeypatch: pytest.MonkeyPatch,
+@pytest.mark.parametrize(
+    ("viscous_ns_per_m", "force_ns_per_m", "mass_kg"),
+    [
+        pytest.param(2e3, 150e3, SEED.valve.mass_kg, id="damps"),
+        pytest.param(12e3, -10e3, 0.03, id="drives a light one"),
+    ],
+)
+def test_a_force_by_velocity_takes_as_few_sub_steps_as_viscous_friction(
+    monkeypatch: pytest.MonkeyPatch, viscous_ns_per_m: float, force_ns_per_m: float, mass_kg: float
 ) -> None:
-    """The automaton as it stands, without compiler: 150 kN s/m, for which the pair would take 10 us."""
+    """The automaton as it stands, without compiler: forces for which the pair would take 10 us."""
     asked = []
 
-    def damping(_F: float, stem: karnopp.Stem, _q: object, _z: object) -> float:
+    def velocity_force(_F: float, stem: karnopp.Stem, _q: object, _z: object) -> float:
         asked.append(stem)
-        return -150e3 * stem.v
+        return -force_ns_per_m * stem.v
 
-    valve = karnopp.karnopp(Composition.from_file(changed(viscous_ns_per_m=2e3)).theta)
+    file = changed(viscous_ns_per_m=viscous_ns_per_m, mass_kg=mass_kg)
+    valve = karnopp.karnopp(Composition.from_file(file).theta)
     begin = (0.05, 0.02, karnopp.SLIP, 1.0, 1e-5, False, None, None)
     drive = karnopp.Drive(0.0, 90e3, 0.0)
-    x, v, *_ = karnopp.step(valve._replace(F_v=152e3), drive, 0.01, *begin)
-    monkeypatch.setattr(karnopp, "force", damping)
+    x, v, *_ = karnopp.step(valve._replace(F_v=viscous_ns_per_m + force_ns_per_m), drive, 0.01, *begin)
+    monkeypatch.setattr(karnopp, "force", velocity_force)
     assert karnopp.step(valve, drive, 0.01, *begin) == pytest.approx((x, v, karnopp.SLIP, 1.0), rel=1e-5)
     assert len(asked) < 100
+
+
+def test_a_stem_that_a_ramp_presses_into_a_stop_creeps_in_balance(monkeypatch: pytest.MonkeyPatch) -> None:
+    """The automaton as it stands: over steps of 0.2 ms it breaks and sticks, over 2 ms it creeps."""
+    asked, wall_m, stop_n_per_m = [], 0.05, 1e8
+
+    def stop(_F: float, stem: karnopp.Stem, _q: object, _z: object) -> float:
+        asked.append(stem)
+        return -stop_n_per_m * max(stem.x - wall_m, 0.0)
+
+    monkeypatch.setattr(karnopp, "force", stop)
+    valve = karnopp.karnopp(Composition.from_file(SEED).theta)
+    begin_m, rate_pa_per_s, duration_s = wall_m + 1e-6, 5e3, 0.02
+    begin_pa = (valve.k_s * begin_m + stop_n_per_m * 1e-6 + valve.F_s) / valve.A
+
+    def pressed(step_s: float) -> tuple[float, int]:
+        asked.clear()
+        x, v, mode, sigma = begin_m, 0.0, karnopp.STUCK, 0.0
+        for k in range(round(duration_s / step_s)):
+            drive = karnopp.Drive(k * step_s, begin_pa + rate_pa_per_s * k * step_s, rate_pa_per_s)
+            x, v, mode, sigma = karnopp.step(valve, drive, step_s, x, v, mode, sigma, 1e-5, False, None, None)
+        return x, len(asked)
+
+    balanced_m = begin_m + valve.A * rate_pa_per_s * duration_s / (stop_n_per_m + valve.k_s)
+    (fine_m, of_fine), (coarse_m, of_coarse) = pressed(0.2e-3), pressed(2e-3)
+    assert coarse_m == pytest.approx(balanced_m, abs=1e-12)
+    assert fine_m == pytest.approx(balanced_m, abs=1e-8)
+    assert of_coarse < 200 < of_fine
 
 
 def off_by_exponential_m(file: ValveFile) -> float:
