@@ -13,15 +13,14 @@ import csv
 from collections.abc import Iterator
 from dataclasses import dataclass
 from pathlib import Path
-from typing import cast
 
-import numba
 import numpy as np
 
 from config.errors import InputError, explain_failure
-from workbench.bench.drawn_loops import Simulate, draw_loops, simulate
+from workbench.bench.drawn_loops import draw_loops, simulate
 from workbench.blind.hiding import hide
 from workbench.blind.sealing import seal
+from workbench.loops.stem_and_process import compiled
 
 CASES = "cases.csv"
 COLUMNS = ("set", "case", "file", "truth", "stiction_pct")
@@ -58,7 +57,7 @@ def write_cases(folder: Path, drawn: int, effects: int, first_seed: int, labelle
 
 
 def _drawn(folder: Path, count: int, first_seed: int) -> Iterator[tuple[str, ...]]:
-    for loop in draw_loops(count, cast(Simulate, numba.njit(cache=True)(simulate)), first_seed=first_seed):
+    for loop in draw_loops(count, compiled(simulate), first_seed=first_seed):
         truth, path = loop.truth, Path("loops") / f"{loop.truth.seed}.csv"
         (folder / path).parent.mkdir(exist_ok=True)
         columns = np.column_stack([loop.time_s, loop.op_pct, loop.pv, loop.sp])

@@ -31,8 +31,11 @@ LEAST_MOTION = 0.1
 
 
 def compiled(function: Function) -> Function:
-    """Return a function compiled on its first call, and kept on disk."""
-    return cast(Function, numba.njit(cache=True)(function))
+    """Return a function compiled on its first call, and kept on disk where a folder may be written."""
+    try:
+        return cast(Function, numba.njit(cache=True)(function))
+    except RuntimeError:  # neither beside the source nor at home
+        return cast(Function, numba.njit(function))
 
 
 @compiled

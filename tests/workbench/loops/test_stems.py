@@ -1,7 +1,9 @@
+from typing import Any
+
 import numpy as np
 import pytest
 
-from workbench.loops.stem_and_process import cost_of, costs_of_stems, respond, rest_positions
+from workbench.loops.stem_and_process import compiled, cost_of, costs_of_stems, respond, rest_positions
 
 
 @pytest.mark.parametrize("slides_on", [False, True])
@@ -46,3 +48,9 @@ def test_the_cost_is_that_of_the_residual_whitened() -> None:
     for row in range(2, 4000):
         pv[row] = 1.2 * pv[row - 1] - 0.5 * pv[row - 2] + 0.3 * shocks[row]
     assert cost_of(np.zeros((0, 4000)), pv)[0] == pytest.approx(3996 * np.log(0.3), rel=0.01)
+
+
+def test_what_is_compiled_is_not_kept_where_no_folder_may_be_written() -> None:
+    nowhere: dict[str, Any] = {}
+    exec("def doubled(value): return 2.0 * value", nowhere)
+    assert compiled(nowhere["doubled"])(2.0) == 4.0
