@@ -209,6 +209,11 @@ def without_holes(run: Run) -> list[Run]:
     return list(runs_within(run, 0))
 
 
+def one_by_one(run: Run) -> list[Run]:
+    """Return a run cut between its quantities, for a device that gives few registers at once."""
+    return [{name: place} for name, place in run.items()]
+
+
 def words_of(run: Mapping[str, Laid]) -> int:
     """Return over how many registers a run goes."""
     return max(each.end for each in run.values()) - min(each.address for each in run.values())

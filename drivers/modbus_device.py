@@ -10,7 +10,7 @@ import math
 import struct
 import time
 from abc import ABC, abstractmethod
-from collections.abc import Mapping
+from collections.abc import Callable, Mapping
 
 from pymodbus.constants import ExcCodes
 from pymodbus.pdu.register_message import (
@@ -22,7 +22,7 @@ from pymodbus.pdu.register_message import (
 )
 
 from config.device import ModbusDevice
-from config.modbus_map import Place, Run, without_holes
+from config.modbus_map import Place, Run, one_by_one, without_holes
 from drivers.boundary import BadReply, Capabilities, DriverError, NoNumber, NoReply, Reading, Refused
 from fieldbus.modbus.exception_codes import exception_text
 from fieldbus.modbus.pdu import encoded
@@ -34,6 +34,11 @@ OF_A_GATEWAY = (ExcCodes.GATEWAY_PATH_UNAVIABLE, ExcCodes.GATEWAY_NO_RESPONSE)
 NOT_NOW = (ExcCodes.ACKNOWLEDGE, ExcCodes.DEVICE_BUSY)
 """Exceptions by which the device says that it is at work on something else."""
 
+CUTS: Mapping[int, Callable[[Run], list[Run]]] = {
+    ExcCodes.ILLEGAL_ADDRESS: without_holes,
+    ExcCodes.ILLEGAL_VALUE: one_by_one,
+}
+"""How a read is cut that is refused: a register is not there, or they are too many at once."""
 READ_COUNTS = (1, 2, 3, 4)
 """Of registers, of reads that make sure that answers are in step with what is asked: none fits another's length."""
 
@@ -124,7 +129,7 @@ class ModbusDriver(ABC):
         try:
             return self._read_all()
         except Refused as refusal:
-            if refusal.code != ExcCodes.ILLEGAL_ADDRESS or not self._split_at_holes():
+            if not self._cut_reads(refusal):
                 raise
         return self._read_all()
 
@@ -138,8 +143,7 @@ class ModbusDriver(ABC):
             try:
                 return self._write_and_read(command_pa)
             except Refused as refusal:
-                without_holes = refusal.code == ExcCodes.ILLEGAL_ADDRESS and self._split_at_holes()
-                if refusal.code != ExcCodes.ILLEGAL_FUNCTION and not without_holes:
+                if refusal.code != ExcCodes.ILLEGAL_FUNCTION and not self._cut_reads():
                     raise
                 self._one_transaction = False
         self.write(command_pa)
@@ -180,12 +184,29 @@ class ModbusDriver(ABC):
             values |= each.values(self._ask(each.request, each.head, each.length))
         return self._reading(values)
 
-    def _split_at_holes(self) -> bool:
-        """Read without holes from now on; return whether there were any."""
-        split = [part for each in self._reads for part in without_holes(each.run)]
-        had_holes = len(split) > len(self._reads)
-        self._reads = [_Read(each) for each in split]
-        return had_holes
+    def _cut_reads(self, refusal: Refused | None = None) -> bool:
+        """Read in smaller parts from now on, if the device then gives what it refuses; return whether it does.
+
+        Of a refused exchange only a read tells whether it was the read in it.
+        """
+        whole = self._reads
+        try:
+            if refusal is None:
+                self._read_all()
+                return False
+        except Refused as of_read:
+            refusal = of_read
+        cut = CUTS.get(refusal.code)
+        parts = [] if cut is None else [_Read(part) for each in whole for part in cut(each.run)]
+        if len(parts) <= len(whole):
+            return False
+        self._reads = parts
+        try:
+            self._read_all()
+        except DriverError:
+            self._reads = whole
+            return False
+        return True
 
     def _configure(self) -> None:
         # The action first: a time-out must never start with another's action.

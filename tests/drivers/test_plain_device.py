@@ -98,6 +98,27 @@ def test_a_device_of_function_6_and_a_short_counter_is_driven_and_loses_nothing(
     link.release()
 
 
+def test_a_device_that_gives_few_registers_at_once_is_asked_for_each_quantity(
+    device: PlainDevice, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    answers = device.slave.handle_request
+
+    def few(request: bytes, broadcast: bool = False) -> bytes:
+        reads = request[0] == defines.READ_HOLDING_REGISTERS
+        if reads and struct.unpack(">H", request[3:5])[0] > 1:
+            return struct.pack(">BB", request[0] | 0x80, defines.ILLEGAL_DATA_VALUE)
+        reply: bytes = answers(request, broadcast)
+        return reply
+
+    monkeypatch.setattr(device.slave, "handle_request", few)
+    device.show(COUNTER, 7)
+    link = Link(driver_for(device.described(None)), RealTimePace(0.01))
+    link.open()
+    assert link.exchange(50e3).position_m == pytest.approx(0.015)
+    link.release()
+    assert device.command == 50
+
+
 def test_a_device_that_was_silent_behind_its_gateway_is_looked_at_before_it_is_commanded(
     device: PlainDevice, monkeypatch: pytest.MonkeyPatch
 ) -> None:
