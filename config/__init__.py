@@ -22,8 +22,8 @@ Its files:
     extras                                        which extra brings what is not installed
     quantities, quantity_map, modbus_map          what a device measures and obeys; where it keeps it; in registers
     register_format                               values in words
-    registers, codes, roles                       the supervisory table; every code and its text; who may write
-    passwords, role_passwords                     passwords as they are kept; the file with those of the roles
+    registers, codes, roles                       every register and who may write it; every code; the roles
+    passwords, role_passwords                     passwords as they are kept, how often one is tried; of the roles
     recording, recording_oddities                 the recording format; what is odd about a recording
     recorder_files                                the files of a daemon's recorder, by their names
     results                                       what results have in common in a notebook

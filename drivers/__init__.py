@@ -3,7 +3,7 @@
     boundary         what every driver does
     modbus_device    a device on any Modbus: its quantities in requests and replies
     modbus_tcp       on TCP, with TLS where that is asked for
-    modbus_rtu       on a serial line
+    modbus_rtu       on a serial line: noise, silence, and replies of others
     canopen          on CANopen
     in_memory        a valve in the same process and virtual time
 

@@ -1,7 +1,8 @@
 """Who a client is, and what its role permits (Modbus/TCP Security).
 
 The client's certificate names its role in the extension 1.3.6.1.4.1.50316.802.1 (a UTF8String: observer, operator or
-engineer). What the role does not permit is refused with exception 1, as the protocol has it, and one line in the log.
+engineer). What the role does not permit, by the table of `config.registers`, is refused with exception 1, as the
+protocol has it, and one line in the log.
 """
 
 import errno

@@ -6,7 +6,7 @@ Between two frames the line is silent for 3.5 characters (`config.serial_port`).
 gap of more than 1.5 characters is made inside it. One that is received is not judged: a USB adapter hands over
 characters in bunches, so what the kernel shows of gaps is its own. Length and check sum decide. pymodbus's search for a
 frame in what was received is not used: it passes over noise behind a frame, and knows no frame of a function that is
-not served, which must be answered too.
+not served, which must be answered too. What a bad frame leads to: `drivers.modbus_rtu`, `sim.slave.rtu_server`.
 
 Source: MODBUS over Serial Line Specification and Implementation Guide V1.02, section 2.5.1.
 """

@@ -8,7 +8,7 @@ real time.
     keyword_records                             how a record is made: by name
     settings, requests, sample                  what it is given, once and in each cycle
     identifying                                 when the estimators run, and when what they found is applied
-    supervision, states, reference              who commands, S0 to S3, the reference and its last change
+    supervision, states, reference              who commands, is the DCS there; S0 to S3; the reference
     monitors, rest_band                         conditions that must not last; where a stem rests by what is known
     laws                                        the laws, a folder each: what commands in S1 and S2
     pressure_clamp                              the one clamp: what is not finite is not commanded

@@ -2,7 +2,8 @@
 
 What is missing at the start refuses the test; what goes away later ends it. Neither comes back by itself: a test that
 was refused or broken off begins when it is asked for anew. After it the law has the command that it had before.
-`docs/reliability.md` shows the table.
+`docs/reliability.md` shows the table. Consent, veto and travel are judged here, for both; the rest by whom it concerns:
+`excitation` for S3, `played_experiment` (`_refusal`) for an experiment.
 """
 
 from dataclasses import dataclass

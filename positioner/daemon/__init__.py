@@ -4,7 +4,7 @@ One blocking thread owns the driver and runs `cycle`; the supervisory server and
 own. They meet only in immutable snapshots that are replaced whole: the cycle waits for nobody.
 
     service, end_signals          starts and ends it; what ends it
-    assembled_valves              its valves from their files, or some of them, with all that runs for them
+    assembled_valves              its valves from their files, with all that runs for them; with what each is left
     workers                       processes that share them, where one processor is too little
     cycle, pacing, link           one cycle, when it begins, and the driver with its connection
     cycles_together               one thread that cycles many valves, where none is waited for

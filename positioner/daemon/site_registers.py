@@ -1,4 +1,7 @@
-"""What is served beside the valve's own: the newest event of its history, who asked how often, the local switch."""
+"""What is served beside the valve's own: the newest event of its history, who asked how often, the local switch.
+
+Earlier events: the history's file, `positioner events`, OPC UA (`recorded_history`).
+"""
 
 from collections.abc import Callable
 

@@ -3,8 +3,8 @@
 `Identification` takes a sample and gives `Estimates`; `accept` decides which of them are applied. Needs numpy only;
 time comes in with the samples.
 
-    online, sample_window, estimates, acceptance    sample by sample; the estimates, and which of them are applied
-    algebraic, weighted_least_squares, validity     the seed's identifier, solved with weights, and what is valid of it
+    online, sample_window, estimates, acceptance    sample by sample; the estimates; whether they replace those in use
+    algebraic, weighted_least_squares, validity     the seed's identifier, with weights; what is uncertain or unphysical
     derivatives, friction_estimator                 velocity and acceleration; what the acceleration leaves for friction
     motion_detector, running_noise                  does the stem move; the noise of its sensor
     recording_estimates, batch                      from a whole recording: find its motions, fit them, check the fit

@@ -1,4 +1,4 @@
-"""The search for a form: ranked, fitted, judged as effects are.
+"""The search for a form: ranked, fitted, judged as effects are (`select.effect_acceptance`).
 
 The likeliest are fitted first, and those of the second turn only where none of the first leaves nothing to explain.
 Where the best is accepted, near, and leaves something, its curve is tried: the same place and variable, a free shape.

@@ -231,10 +231,10 @@ class Likelihood:
 
     def at(self, theta: Vector, onsets_s: Vector) -> Groups:
         """Simulate; return the residuals. Those asked for last are kept: a minimiser asks again for derivatives."""
-        asked = theta.tobytes() + onsets_s.tobytes()
-        if self._last is None or self._last[0] != asked:
-            self._last = asked, self.of_path(self.path(theta, onsets_s), theta)
-        return self._last[1]
+        asked, last = theta.tobytes() + onsets_s.tobytes(), self._last
+        if last is None or last[0] != asked:  # another thread may ask meanwhile
+            self._last = last = asked, self.of_path(self.path(theta, onsets_s), theta)
+        return last[1]
 
     def path(self, theta: Vector, onsets_s: Vector) -> ToldPath:
         """Simulate, the sensor's rounding left out."""

@@ -8,7 +8,7 @@ Its files:
     fleet               puts it together: the ranked valves
     manifest            which recording is of which valve, and of when
     examination         one recording held against one model: looked at, refitted, diagnosed
-    valve_complaints    a valve's recordings in turn, its models over time, what it complains of
+    valve_complaints    a valve's recordings in turn, its models over time, what it complains of, its rank
     engine              examinations on many processors, by Dask
     model_changes       what changed of the valves since a time
     tables              results for other programs, as Parquet

@@ -112,6 +112,7 @@ class ToldRun:
         self._first_onsets_s = np.array([0.5 * (time_s[each.before] + time_s[each.before + 1]) for each in told])
         self._first_onsets_s.setflags(write=False)
         self._fed = {each.segment.first: self._fed_m(each) for each in self._parts}
+        self._last_shares: tuple[bytes, tuple[Vector, ...]] | None = None
 
     def _fed_m(self, part: "_Part") -> Vector:
         """Return what a positioner is fed: the measured stem, m, (periods + 1,); NaN, the simulated, without a rest.
@@ -149,10 +150,9 @@ class ToldRun:
         vector, alone = np.array(theta[self.free._kept]), 0.0 if eased else 1.0
         indicated_m = np.full(len(self.record), np.nan)
         bears, breaks = np.zeros(len(self.moves)), np.zeros(len(self.moves))
-        for part in self._parts:
+        for part, held in zip(self._parts, self._rest_shares_of_parts(onsets_s), strict=True):
             segment = part.segment
             drive_pa, state = self.free._started(vector, segment)
-            held = self._held(part, onsets_s)
             seen_m = self._fed[segment.first]
             shown_m, loads = np.empty(segment.periods_s.size + 1), np.empty((2, segment.periods_s.size))
             self._tell(
@@ -168,7 +168,14 @@ class ToldRun:
                 )
         return ToldPath(indicated_m, bears, breaks)
 
-    def _held(self, part: "_Part", onsets_s: Vector) -> Vector:
+    def _rest_shares_of_parts(self, onsets_s: Vector) -> tuple[Vector, ...]:
+        """Return as `_rest_shares` of each segment; kept: of what is asked in turn the onsets are mostly one."""
+        asked, last = onsets_s.tobytes(), self._last_shares
+        if last is None or last[0] != asked:  # another thread may ask meanwhile
+            self._last_shares = last = asked, tuple(self._rest_shares(part, onsets_s) for part in self._parts)
+        return last[1]
+
+    def _rest_shares(self, part: "_Part", onsets_s: Vector) -> Vector:
         """Return the share of each period for which the stem is held."""
         periods = part.starts_s.size - 1
         onset_s = onsets_s[part.first : part.end][part.let_go]

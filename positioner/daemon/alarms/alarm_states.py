@@ -6,7 +6,8 @@
     returned         -- it holds -->       unacknowledged
     any              -- shelved -->        shelved           -- its time is over, or unshelved -->  what holds then
 
-A shelved alarm is followed but not shown; one that holds when its time is over is unacknowledged.
+A shelved alarm is followed but not shown. Its time is as asked, at most `[alarms] shelve_limit_s` (`alarm_table`); one
+that holds then is unacknowledged.
 """
 
 from typing import NamedTuple

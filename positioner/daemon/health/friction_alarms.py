@@ -1,11 +1,11 @@
 """Alarms of friction too high, friction too low and missed moves, by tests that keep a promise (`e_detector`).
 
-    friction    an identification's F_c with its deviation, against the limits of [health] times the baseline
+    friction    an identification's F_c with its deviation, against the limits of [health] times its baseline
     stiction    each move that was asked for, made or missed, against [health] stiction_limit
 
-A test raises the alarm. It is over when the figure is back within its limit: friction by the next identification,
-stiction by the index over the last moves. An identification counts an hour after the one before it at the earliest, and
-the first after a start as if an hour had passed.
+The baseline is taken in `valve_health`. A test raises the alarm. It is over when the figure is back within its limit:
+friction by the next identification, stiction by the index over the last moves. An identification counts an hour after
+the one before it at the earliest, and the first after a start as if an hour had passed.
 """
 
 from dataclasses import dataclass

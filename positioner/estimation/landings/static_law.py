@@ -16,7 +16,7 @@ the median m of by how much they may, of the direction in which it is more, is a
 however many landings:
 
     var φ_up += (κ m)^2,   var φ_down += (κ m)^2
-A stem that swings past its balance has its landings on the law with their balances (`swing.py`).
+A stem that swings past its balance has its landings on the law with their balances (`overshoot.py`).
 The friction of the seed's symmetric model is φ = (φ_up + φ_down)/2; what that model calls impossible is the offset
 
     (φ_up - φ_down)/2        0 without preload and with the same friction both ways
