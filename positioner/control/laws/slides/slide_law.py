@@ -86,8 +86,7 @@ class SlideLaw:
             memory, planned = let_go(memory, seen.command_pa, settings), None
         elif seen.usable:
             balance = balance_after(balance, seen.ratios, seen, settings.stroke_m)
-            rest, quantum_m = seen.statics.detector.rest, seen.statics.detector.quantum_m
-            planned = None if rest is None else Planned(rest, quantum_m, seen.reference_m, balance, settings)
+            planned = Planned.of(seen, balance, settings)
             stands = memory.stands(seen.sample.now_s, settings)
             if planned is None or planned != self.planned or not stands:
                 memory = stepped(memory, Now.of(seen, balance, settings))
@@ -118,6 +117,20 @@ class Planned(NamedTuple):
     reference_m: float
     balance: Balance
     settings: SlideSettings
+
+    @classmethod
+    def of(cls, seen: Seen, balance: Balance, settings: SlideSettings) -> "Planned | None":
+        """Return it of a sample; None where the stem does not rest."""
+        detector = seen.statics.detector
+        if detector.rest is None:
+            return None
+        return cls(
+            rest=detector.rest,
+            quantum_m=detector.quantum_m,
+            reference_m=seen.reference_m,
+            balance=balance,
+            settings=settings,
+        )
 
 
 def let_go(memory: SlideMemory, command_pa: float, bounds: SlideBounds) -> SlideMemory:
