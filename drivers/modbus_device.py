@@ -10,7 +10,7 @@ import math
 import struct
 import time
 from abc import ABC, abstractmethod
-from collections.abc import Callable, Mapping
+from collections.abc import Callable, Mapping, Sequence
 
 from pymodbus.constants import ExcCodes
 from pymodbus.pdu.register_message import (
@@ -127,11 +127,11 @@ class ModbusDriver(ABC):
     def read(self) -> Reading:
         """Return a measurement."""
         try:
-            return self._read_all()
+            return self._read_all(self._reads)
         except Refused as refusal:
             if not self._cut_reads(refusal):
                 raise
-        return self._read_all()
+        return self._read_all(self._reads)
 
     def write(self, command_pa: float) -> None:
         """Command a pressure."""
@@ -143,7 +143,7 @@ class ModbusDriver(ABC):
             try:
                 return self._write_and_read(command_pa)
             except Refused as refusal:
-                if refusal.code != ExcCodes.ILLEGAL_FUNCTION and not self._cut_reads():
+                if refusal.code != ExcCodes.ILLEGAL_FUNCTION and not self._cut_reads(refusal):
                     raise
                 self._one_transaction = False
         self.write(command_pa)
@@ -178,35 +178,30 @@ class ModbusDriver(ABC):
         except Refused:
             return None
 
-    def _read_all(self) -> Reading:
+    def _read_all(self, reads: Sequence["_Read"]) -> Reading:
         values: dict[str, float] = {}
-        for each in self._reads:
+        for each in reads:
             values |= each.values(self._ask(each.request, each.head, each.length))
         return self._reading(values)
 
-    def _cut_reads(self, refusal: Refused | None = None) -> bool:
+    def _cut_reads(self, refusal: Refused) -> bool:
         """Read in smaller parts from now on, if the device then gives what it refuses; return whether it does.
 
-        Of a refused exchange only a read tells whether it was the read in it.
+        What was refused may have been the command beside a read: the whole is read once more.
         """
-        whole = self._reads
-        try:
-            if refusal is None:
-                self._read_all()
-                return False
-        except Refused as of_read:
-            refusal = of_read
         cut = CUTS.get(refusal.code)
-        parts = [] if cut is None else [_Read(part) for each in whole for part in cut(each.run)]
-        if len(parts) <= len(whole):
+        parts = [] if cut is None else [_Read(part) for each in self._reads for part in cut(each.run)]
+        if len(parts) <= len(self._reads) or not self._refuses(self._reads) or self._refuses(parts):
             return False
         self._reads = parts
-        try:
-            self._read_all()
-        except DriverError:
-            self._reads = whole
-            return False
         return True
+
+    def _refuses(self, reads: Sequence["_Read"]) -> bool:
+        try:
+            self._read_all(reads)
+        except Refused:
+            return True
+        return False
 
     def _configure(self) -> None:
         # The action first: a time-out must never start with another's action.

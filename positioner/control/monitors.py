@@ -7,9 +7,8 @@
     overrun            t - t_before > threshold * period               in real time
     command rate       |u - u_before| / (t - t_before) > threshold * span   while no fault is latched
 
-t on the clock of the cycle. Nothing here knows the law. A DCS that is silent and samples that are stale are judged in
-`supervision`. An alarm ends with its condition; a fault is latched by
-`supervision`.
+t on the clock of the cycle. Nothing here knows the law. An alarm ends with its condition; a fault is latched by
+`supervision`, which judges a silent DCS and stale samples itself.
 
 Where no stem rests is where a valve that has been identified needs no more (`rest_band`): in automatic
 

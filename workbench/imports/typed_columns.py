@@ -125,10 +125,11 @@ def in_si(path: Path, samples: Samples, source: Source, unit: str, decimal: str,
             f"{samples.header.table.place} {samples.lines[bare]}: {samples.cells[source.theirs][bare]!r} in "
             f"{source.theirs!r} has no unit, and others there are in {' and '.join(own)}: mend the file",
         )
-    low, high = float(np.nanmin(raw)), float(np.nanmax(raw))
-    if plain == "%" and source.name == "position_m" and 0.0 <= low <= high - LEAST_SHARE_TRAVEL and high <= 1.0:
-        told = f"goes from {low:g} to {high:g} %: if these are shares of 1, position_m={source.theirs}:p.u."
-        samples.notes[f"{source.theirs} in %"] = told
+    if plain == "%" and source.name == "position_m":
+        low, high = float(np.nanmin(raw)), float(np.nanmax(raw))
+        if 0.0 <= low <= high - LEAST_SHARE_TRAVEL and high <= 1.0:
+            told = f"goes from {low:g} to {high:g} %: if these are shares of 1, position_m={source.theirs}:p.u."
+            samples.notes[f"{source.theirs} in %"] = told
     if len(own) < 2:
         return _scale(raw, source, plain, scale, turned=turned)
     samples.notes[f"units of {source.theirs}, each cell by its own"] = ", ".join(
