@@ -46,7 +46,7 @@ from positioner.control.keyword_records import by_name
 from positioner.control.laws.boundary import Law, Seen, seen_of
 from positioner.control.monitors import MonitorMemory, Needs, after_cycle, needs_of
 from positioner.control.played_experiment import PlayedExperiment, Surroundings, experiment_after
-from positioner.control.pressure_clamp import clamped
+from positioner.control.pressure_clamp import clamped, number_of
 from positioner.control.pressure_lead import PathMemory, long_held
 from positioner.control.reference import Reference
 from positioner.control.requests import Requests
@@ -102,7 +102,8 @@ class Controller:
     @property
     def left_pa(self) -> float:
         """What it holds from now on if it is left: no push, and no lead."""
-        return self._memory.law.interrupted_pa(self._memory.wanted_pa)
+        left_pa = _left_pa(self._memory.law, self._memory)
+        return left_pa if isfinite(left_pa) else self._memory.wanted_pa
 
     @property
     def knowledge(self) -> ValveKnowledge | None:
@@ -456,7 +457,7 @@ def _law(now: Now, before: Law, seen: Seen, *, one_direction: bool) -> tuple[int
     asked_back = asked_back and seen.reference_m != memory.reference.value_m
     if memory.first_landing != unseen or asked_back:
         law = before.observe(seen)
-        if not unseen_direction.needed(seen, ratios, law.command_pa, now.settings.limits.stroke_m):
+        if not unseen_direction.needed(seen, ratios, number_of(law.command_pa), now.settings.limits.stroke_m):
             return 0, law
     return unseen, before.observe(seen._replace(ratios=None))
 
@@ -525,7 +526,7 @@ def _experiment(now: Now, supervision: SupervisionMemory) -> PlayedExperiment:
         excited=requests.eta[0] == 0,
         position_m=supervision.position_m,
         command_pa=memory.last.command_pa,
-        held_pa=memory.law.interrupted_pa(memory.wanted_pa),
+        held_pa=_left_pa(memory.law, memory),
     )
     return experiment_after(before, requests.experiment, around, now.settings.experiment)
 
@@ -682,7 +683,12 @@ def _held_pa(now: Now, state: State, supervision: SupervisionMemory, law: Law) -
         return sample.pressure_pa
     if state is S3 or memory.last.state is S3:
         return memory.held_pa
-    return law.interrupted_pa(memory.wanted_pa)
+    return _left_pa(law, memory)
+
+
+def _left_pa(law: Law, memory: ControllerMemory) -> float:
+    """Return what a law has held if something interrupts it now, Pa; NaN where it says no number."""
+    return number_of(law.interrupted_pa(memory.wanted_pa))
 
 
 def _pressure_pa(
@@ -698,4 +704,4 @@ def _pressure_pa(
         return now.settings.maximum_pa if cut_off == HIGH else now.settings.minimum_pa
     if state is S3 and exciting is not None:
         return exciting.pressure_pa(now.sample.now_s)
-    return law.command_pa if state in FOLLOWING else held_pa
+    return number_of(law.command_pa) if state in FOLLOWING else held_pa

@@ -8,6 +8,7 @@ daemon's own (`Fault.COMMAND_NOT_FINITE`).
 """
 
 from math import isfinite, nan
+from numbers import Real
 
 
 def clamped(pressure_pa: float, least_pa: float, most_pa: float) -> float:
@@ -17,3 +18,12 @@ def clamped(pressure_pa: float, least_pa: float, most_pa: float) -> float:
     (1.0, nan)
     """
     return min(max(pressure_pa, least_pa), most_pa) if isfinite(pressure_pa) else nan
+
+
+def number_of(asked: object) -> float:
+    """Return what a law gives for a pressure, Pa; NaN where it is no number, as of a text.
+
+    >>> number_of(1), number_of("1")
+    (1.0, nan)
+    """
+    return float(asked) if isinstance(asked, Real) else nan

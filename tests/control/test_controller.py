@@ -3,7 +3,7 @@
 from collections.abc import Callable
 from dataclasses import dataclass, replace
 from math import inf, isfinite, nan
-from typing import Self
+from typing import ClassVar, Self
 
 import pytest
 
@@ -12,7 +12,7 @@ from config.daemon_file import DaemonFile
 from config.quantities import DeviceStatus
 from positioner.control.controller import Controller
 from positioner.control.controller_memory import Decision
-from positioner.control.laws.boundary import Seen, Unlearning
+from positioner.control.laws.boundary import Law, LawSettings, Seen, Unlearning
 from positioner.control.requests import QUIET, Requests
 from positioner.control.sample import Sample
 from positioner.control.settings import Settings
@@ -24,6 +24,44 @@ LAW = {"b_over_c_pa_per_m": -800e3, "k_over_c_pa": -20e3}
 BETA_PA = 13e3
 
 
+@dataclass
+class ScriptedSettings:
+    """Settings of a law that asks for what a test says, and else for what another does."""
+
+    other: LawSettings
+    asks: object = None
+    """What the law says from now on for a pressure; None: what the other does."""
+
+    by_single_steps: ClassVar[bool] = False
+
+    @classmethod
+    def of(cls, file: DaemonFile) -> Self:
+        raise NotImplementedError
+
+    def begin(self, held_pa: float) -> "ScriptedLaw":
+        return ScriptedLaw(self, self.other.begin(held_pa))
+
+
+@dataclass(frozen=True)
+class ScriptedLaw(Unlearning):
+    script: ScriptedSettings
+    other: Law
+
+    @property
+    def command_pa(self) -> float:
+        return self.interrupted_pa(self.other.command_pa)
+
+    @property
+    def inhibit_reason(self) -> InhibitReason:
+        return self.other.inhibit_reason
+
+    def observe(self, seen: Seen) -> "ScriptedLaw":
+        return replace(self, other=self.other.observe(seen))
+
+    def interrupted_pa(self, command_pa: float) -> float:
+        return command_pa if self.script.asks is None else self.script.asks  # type: ignore[return-value]
+
+
 class Bench:
     """A controller, the requests of its DCS and the time; the stem stays where the test puts it."""
 
@@ -32,7 +70,9 @@ class Bench:
         assert isinstance(control, dict)
         own = {"control": {"law": "seed", **control}, **tables}
         file = DaemonFile.model_validate({"valve": {"stroke_m": STROKE_M}, "law": LAW, **own})
-        self.controller = Controller(Settings.of(file), HELD_PA)
+        settings = Settings.of(file)
+        self.law = ScriptedSettings(settings.law)
+        self.controller = Controller(replace(settings, law=self.law), HELD_PA)
         self.requests = Requests(beta_pa=BETA_PA)
         self.now_s = 0.0
         self.position_m = 0.03
@@ -279,31 +319,23 @@ def stall(bench: Bench) -> Decision:
     return bench.step(unattended_s=2.0)
 
 
-@dataclass(frozen=True)
-class BrokenLaw(Unlearning):
-    """A law that has divided by zero: nothing that it says from then on is a finite number."""
-
-    command_pa: float
-    inhibit_reason: InhibitReason = InhibitReason.NOTHING
-
-    def observe(self, _seen: Seen) -> Self:
-        return self
-
-    def interrupted_pa(self, _command_pa: float) -> float:
-        return self.command_pa
+NO_PRESSURES = [nan, inf, -inf, "60000", (60e3,), 60e3 + 0j]
+"""What a law says that has divided by zero, or gives no number at all."""
 
 
-def broken_by(command_pa: float) -> Fail:
-    def divide(bench: Bench) -> Decision:
-        bench.controller._memory = bench.controller._memory._replace(law=BrokenLaw(command_pa))
-        return bench.step()
+def broken_by(asks: object) -> Fail:
+    def say(bench: Bench) -> Decision:
+        bench.law.asks = asks
+        decision = bench.step()
+        bench.law.asks = None
+        return decision
 
-    return divide
+    return say
 
 
 FAILURES = [
     (broken_by(nan), Fault.COMMAND_NOT_FINITE),
-    (broken_by(inf), Fault.COMMAND_NOT_FINITE),
+    (broken_by("60000"), Fault.COMMAND_NOT_FINITE),
     (lose, Fault.NO_REPLY),
     (jump, Fault.IMPLAUSIBLE),
     (break_down, Fault.DEVICE),
@@ -344,18 +376,19 @@ def test_recovery_moves_nothing_before_the_mode_is_chosen_again(fail: Fail, faul
 
 
 @pytest.mark.parametrize("mode", [Mode.AUTOMATIC, Mode.HOLD])
-@pytest.mark.parametrize("command_pa", [nan, inf, -inf])
-def test_a_command_that_is_not_finite_never_leaves_and_the_last_one_is_held(mode: Mode, command_pa: float) -> None:
-    """In hold it is what follows an interruption that is none."""
+@pytest.mark.parametrize("asks", NO_PRESSURES)
+def test_a_command_that_is_not_finite_never_leaves_and_the_last_one_is_held(mode: Mode, asks: object) -> None:
+    """In hold it is what follows an interruption that is none. A text, which is no number, is none either."""
     bench = automatic()
     bench.ask(reference_m=0.05)
     before_pa = bench.step().command_pa
     bench.ask(mode=mode)
-    failed = broken_by(command_pa)(bench)
+    bench.law.asks = asks
+    failed = bench.step()
     assert (failed.fault, failed.state, failed.mode) == (Fault.COMMAND_NOT_FINITE, State.S0_START, Mode.HOLD)
     assert failed.command_pa == before_pa
     assert {bench.step().command_pa for _ in range(5)} == {before_pa}
-    assert isfinite(bench.controller.left_pa)
+    assert bench.controller.left_pa == before_pa, "and so it leaves the valve"
 
 
 @pytest.mark.parametrize("excitation", ["staircase", "sine"])
