@@ -263,15 +263,8 @@ class _Listener(ThreadingTCPServer):
         if self._guard is None:
             super().finish_request(request, client_address)
             return
-        peer = self._connections.pop(request)
-        try:
-            wrapped = self._guard.wrap(request)
-        except OSError as error:  # it was reset before its thread had begun
-            self._places.leave(peer)
-            self._say_refused(peer, failure_reason(error))
-            return
-        with wrapped as secured:
-            self._connections[secured] = peer  # from here on the other is an empty shell
+        with self._guard.wrap(request) as secured:
+            peer = self._connections[secured] = self._connections.pop(request)  # from here on that is an empty shell
             try:
                 self.identities[peer] = self._guard.handshake(secured)
                 if self._has_place(peer, str(client_address[0])):

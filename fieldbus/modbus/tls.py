@@ -13,8 +13,10 @@ import socket
 import ssl
 import stat
 import time
+from contextlib import suppress
 from datetime import datetime
 from pathlib import Path
+from typing import Any
 
 from config.errors import InputError, explain_failure
 from config.tls_table import Tls
@@ -82,6 +84,20 @@ def _ends_of_lists(file: Path) -> list[datetime]:
         raise InputError(str(file), "holds a list of revoked certificates that cannot be read") from None
 
 
+class AcceptedSocket(ssl.SSLSocket):
+    """The TLS socket of an accepted connection: it was connected, even where its peer has reset it by now.
+
+    The module ssl asks for the peer's address to find out whether a socket is connected. It leaves one open that is
+    reset at that moment. Here the handshake finds it out.
+    """
+
+    def getpeername(self) -> Any:
+        """Return the peer's address; None of one that has reset the connection."""
+        with suppress(OSError):
+            return super().getpeername()
+        return None
+
+
 class Guard:
     """A server's side: handshakes, and what each client may do.
 
@@ -102,13 +118,8 @@ class Guard:
         self._context, self._revoked = _server_context(tls), _revoked_numbers(tls)
 
     def wrap(self, connection: socket.socket) -> ssl.SSLSocket:
-        """Return an accepted connection as a TLS socket, before its `handshake`.
-
-        Raises:
-            OSError: it is gone already; it is left as it was.
-        """
+        """Return an accepted connection as a TLS socket, before its `handshake`, which finds out whether it is gone."""
         self._look_for_changes()
-        connection.getpeername()  # of one that was reset the module ssl would leave a socket open
         return self._context.wrap_socket(connection, server_side=True, do_handshake_on_connect=False)
 
     def handshake(self, connection: ssl.SSLSocket) -> Identity:
@@ -159,6 +170,7 @@ def _server_context(tls: Tls) -> ssl.SSLContext:
     context = _context(tls, ssl.PROTOCOL_TLS_SERVER)
     context.verify_mode = ssl.CERT_REQUIRED
     context.num_tickets = 0  # every connection shows its certificate
+    context.sslsocket_class = AcceptedSocket
     return context
 
 

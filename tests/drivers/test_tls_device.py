@@ -1,6 +1,5 @@
 """Modbus/TCP Security between driver and device: the contract of every driver, and every way not to get in."""
 
-import errno
 import logging
 import re
 import shutil
@@ -499,6 +498,36 @@ def test_a_count_that_no_request_may_have_is_not_walked_through() -> None:
     assert len(asked) <= 2 * 123
 
 
+RESET = struct.pack("ii", 1, 0)
+"""To linger for no time: a close is then a reset."""
+
+
+class ResetMeanwhile(socket.socket):
+    """An accepted connection that its peer resets while the module ssl takes it over."""
+
+    peer: socket.socket
+
+    def gettimeout(self) -> float | None:
+        self.peer.close()
+        return super().gettimeout()
+
+
+@pytest.mark.parametrize("moment", ["before", "meanwhile"])
+def test_a_connection_that_is_reset_before_its_handshake_is_found_out_there_and_left_open_by_nobody(
+    moment: str,
+) -> None:
+    with socket.create_server(("127.0.0.1", 0)) as listener:
+        peer = socket.create_connection(listener.getsockname())
+        peer.setsockopt(socket.SOL_SOCKET, socket.SO_LINGER, RESET)
+        accepted = ResetMeanwhile(fileno=listener.accept()[0].detach())
+    accepted.peer = peer
+    if moment == "before":
+        peer.close()
+    guard = guarded()
+    with guard.wrap(accepted) as secured, pytest.raises(ConnectionResetError):
+        guard.handshake(secured)
+
+
 def test_connections_that_are_reset_at_once_are_refused_in_a_line_and_lock_out_nobody(
     caplog: pytest.LogCaptureFixture,
 ) -> None:
@@ -507,33 +536,9 @@ def test_connections_that_are_reset_at_once_are_refused_in_a_line_and_lock_out_n
     with device_with(guarded(), limits) as (_, server):
         for _ in range(60):
             line = socket.create_connection(("127.0.0.1", server.port), 5.0)
-            line.setsockopt(socket.SOL_SOCKET, socket.SO_LINGER, struct.pack("ii", 1, 0))  # the close is a reset
+            line.setsockopt(socket.SOL_SOCKET, socket.SO_LINGER, RESET)
             line.close()
         driver = ModbusTcpDriver(ModbusTcpDevice(port=server.port, reply_timeout_s=5.0, tls=tls("daemon")))
         opened(driver)
         driver.close()
     assert [each.getMessage() for each in caplog.records if each.exc_info] == []
-
-
-def test_a_connection_that_is_gone_before_it_is_secured_leaves_no_place_taken(
-    monkeypatch: pytest.MonkeyPatch, caplog: pytest.LogCaptureFixture
-) -> None:
-    guard, wrap = guarded(), Guard.wrap
-    gone = [True] * 20
-
-    def wrapped(each: Guard, line: socket.socket) -> ssl.SSLSocket:
-        if gone:
-            gone.pop()
-            raise OSError(errno.ENOTCONN, "Transport endpoint is not connected")
-        return wrap(each, line)
-
-    monkeypatch.setattr(Guard, "wrap", wrapped)
-    with device_with(guard, ServerLimits(most_clients=4, clients_per_host=4)) as (_, server):
-        while gone:
-            with socket.create_connection(("127.0.0.1", server.port), 5.0) as line:
-                assert line.recv(1) == b""
-        driver = ModbusTcpDriver(ModbusTcpDevice(port=server.port, reply_timeout_s=5.0, tls=tls("daemon")))
-        opened(driver)
-        driver.close()
-    assert [each.getMessage() for each in caplog.records if each.exc_info] == []
-    assert "Transport endpoint is not connected" in caplog.text
