@@ -21,7 +21,7 @@ import numpy as np
 from positioner.control.laws.slides.certificate import Certificate, KnownValve, Refused, certified, local_factor
 from positioner.control.laws.slides.slide_law import SlideSettings
 from positioner.control.laws.slides.slide_pressure import Balance
-from positioner.control.laws.slides.states import Idle
+from positioner.control.laws.slides.slide_states import Idle
 from positioner.estimation.acceptance import Ratios
 from positioner.estimation.landings.breakaway_distance import BreakawayDistance, Interval
 from positioner.estimation.landings.static_law import static_law

@@ -24,7 +24,7 @@ from workbench.bench.scores import area
 from workbench.loops import LoopRecord, diagnose_loop
 from workbench.loops.calibration import Calibration, Evidence
 from workbench.loops.causes import Size
-from workbench.loops.thresholds import LIMITS
+from workbench.loops.loop_thresholds import LIMITS
 
 NUMBERS, THRESHOLD = 1000, 2000
 """First seeds of the loops that the three numbers and the threshold are from."""

@@ -22,11 +22,11 @@ from dataclasses import replace
 from config.canopen_device import CanopenDevice
 from config.quantities import DeviceStatus
 from drivers.boundary import Capabilities, Driver, DriverError, Reading, Refused
-from drivers.canopen.activation import Activation
+from drivers.canopen.device_states import Activation
 from drivers.canopen.events import NodeEvent
 from drivers.canopen.node_bus import EMERGENCY, HEARTBEAT, NMT, SDO_ANSWER
-from drivers.canopen.only_watch import NodeDriver, WatchingDriver
 from drivers.canopen.sdo import ILLEGAL_VALUE, Setting
+from drivers.canopen.watching_driver import NodeDriver, WatchingDriver
 from fieldbus.canopen.objects import HOLDING, LOCAL, STATE_BITS, NodeState, inactive_because
 
 START, ENTER_PRE_OPERATIONAL = 1, 128  # NMT commands of CiA 301

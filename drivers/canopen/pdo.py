@@ -22,7 +22,8 @@ from config.canopen_device import CanopenDevice, Entry
 from config.errors import InputError
 from drivers.boundary import BadReply, NoNumber, NoReply
 from drivers.canopen.events import NodeEvent
-from drivers.canopen.found_pdos import (
+from drivers.canopen.node_bus import NodeBus
+from drivers.canopen.pdo_mapping import (
     EACH_SYNC,
     INVALID,
     LAST_SYNCHRONOUS,
@@ -32,7 +33,6 @@ from drivers.canopen.found_pdos import (
     that_carry,
     that_takes,
 )
-from drivers.canopen.node_bus import NodeBus
 from drivers.canopen.sdo import REALS, SdoTransfers, Setting, sheet_variable
 from drivers.canopen.watcher import NodeWatcher
 from fieldbus.canopen.objects import MOST_PDOS, Control, first_fit

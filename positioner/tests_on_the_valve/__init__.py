@@ -4,7 +4,7 @@ For the instrument technician: docs/tests-on-the-valve.md. A test knows nothing 
 registers, a cycle of the command's own, or virtual time. It needs numpy alone.
 
     program                         what is played, within what, and what came of it
-    thresholds                      every number by which tests are paced and judged, with its reason
+    valve_test_thresholds           every number by which tests are paced and judged, with its reason
     own_cycle                       programs on a cycle that this process turns itself
     ramps                           slow ramps: lines, ends, and what they are at no rate
     signature                       the valve signature: friction, spring rate, bench set, seat load, bands

@@ -13,7 +13,7 @@ from config.codes import ValveTestVerdict
 from config.recording import Column, Recording
 from positioner.response.figure import Figure, no_value
 from positioner.tests_on_the_valve.ramps import rate_of
-from positioner.tests_on_the_valve.thresholds import THRESHOLDS
+from positioner.tests_on_the_valve.valve_test_thresholds import THRESHOLDS
 
 
 def air_rates(recording: Recording, commanded_pa_per_s: float) -> tuple[Figure, Figure]:

@@ -33,7 +33,7 @@ from positioner.tests_on_the_valve.kept_records import (
     span_of,
 )
 from positioner.tests_on_the_valve.outcome import Curve, Picture, Quantity
-from positioner.tests_on_the_valve.thresholds import THRESHOLDS
+from positioner.tests_on_the_valve.valve_test_thresholds import THRESHOLDS
 
 if TYPE_CHECKING:
     from pathlib import Path

@@ -16,7 +16,7 @@ from numpy.typing import NDArray
 from config.recording import Column, Recording
 from positioner.response.figure import Figure, no_value
 from positioner.tests_on_the_valve.ramps import rate_of
-from positioner.tests_on_the_valve.thresholds import THRESHOLDS
+from positioner.tests_on_the_valve.valve_test_thresholds import THRESHOLDS
 from signals.noise import quantum_m
 
 

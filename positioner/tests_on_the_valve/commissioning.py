@@ -31,7 +31,7 @@ from positioner.tests_on_the_valve.air_rates import air_rates, supply_lacking, v
 from positioner.tests_on_the_valve.outcome import Outcome, Quantity, digits
 from positioner.tests_on_the_valve.program import Bounds, Leap, Player, Program, ramped
 from positioner.tests_on_the_valve.ramps import difference, rate_of, scaled
-from positioner.tests_on_the_valve.thresholds import THRESHOLDS
+from positioner.tests_on_the_valve.valve_test_thresholds import THRESHOLDS
 from signals.noise import quantum_m
 
 TEST = "commissioning"

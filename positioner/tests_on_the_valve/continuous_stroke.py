@@ -19,7 +19,7 @@ from positioner.response.figure import Figure, no_value
 from positioner.tests_on_the_valve.breakout import Breakout, breakout, rest_before, tolerance_m
 from positioner.tests_on_the_valve.outcome import Curve, Outcome, Picture, Quantity
 from positioner.tests_on_the_valve.program import Bounds, Leap, Played, Program, ramped, require_within
-from positioner.tests_on_the_valve.thresholds import THRESHOLDS
+from positioner.tests_on_the_valve.valve_test_thresholds import THRESHOLDS
 
 TEST = "continuous stroke test"
 

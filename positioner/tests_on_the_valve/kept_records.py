@@ -27,7 +27,7 @@ from config.results.block import Table
 from config.whole_file import replace_whole
 from positioner.response.figure import Figure
 from positioner.tests_on_the_valve.outcome import TURNED, Curve, Outcome, Picture, Quantity
-from positioner.tests_on_the_valve.thresholds import THRESHOLDS
+from positioner.tests_on_the_valve.valve_test_thresholds import THRESHOLDS
 
 KINDS = ("factory", "as_found", "as_left")
 """What a record is kept as; the newest of a kind stands for it."""

@@ -38,7 +38,7 @@ from positioner.tests_on_the_valve.breakout import (
 from positioner.tests_on_the_valve.outcome import Curve, Outcome, Picture, Quantity
 from positioner.tests_on_the_valve.program import SHORTEST_S, Bounds, Leap, Played, Program, ramped, require_within
 from positioner.tests_on_the_valve.ramps import difference, legs_of, ramps_of
-from positioner.tests_on_the_valve.thresholds import THRESHOLDS
+from positioner.tests_on_the_valve.valve_test_thresholds import THRESHOLDS
 
 TEST = "partial stroke test"
 

@@ -35,7 +35,7 @@ from positioner.tests_on_the_valve.air_rates import supply_lacking, verdict_at_r
 from positioner.tests_on_the_valve.outcome import Curve, Outcome, Picture, Quantity
 from positioner.tests_on_the_valve.program import Bounds, Leap, Program, ramped
 from positioner.tests_on_the_valve.ramps import Leg, Line, Ramps, difference, legs_of, ramps_of, scaled
-from positioner.tests_on_the_valve.thresholds import THRESHOLDS
+from positioner.tests_on_the_valve.valve_test_thresholds import THRESHOLDS
 
 LEGS = 2.0 + 1.0 / THRESHOLDS.least_rate_ratio
 """There and back, and at the fast rate from the command in force to the nearer end and back: as long as slow legs."""

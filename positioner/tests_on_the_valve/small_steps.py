@@ -21,7 +21,7 @@ from positioner.response.response_figures import respond
 from positioner.tests_on_the_valve.outcome import Curve, Outcome, Picture, Quantity
 from positioner.tests_on_the_valve.program import Bounds, Leap, Program, ramped, require_within
 from positioner.tests_on_the_valve.ramps import scaled
-from positioner.tests_on_the_valve.thresholds import THRESHOLDS
+from positioner.tests_on_the_valve.valve_test_thresholds import THRESHOLDS
 
 TEST = "step test"
 

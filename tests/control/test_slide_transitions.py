@@ -14,7 +14,7 @@ from positioner.control.laws.slides import transitions
 from positioner.control.laws.slides.plan import Plan
 from positioner.control.laws.slides.slide_law import SlideLaw
 from positioner.control.laws.slides.slide_memory import SlideMemory
-from positioner.control.laws.slides.states import Idle, Out, Presliding, Sliding
+from positioner.control.laws.slides.slide_states import Idle, Out, Presliding, Sliding
 from positioner.control.laws.slides.transitions import TABLE
 from tests.cases import few_always
 from tests.control.scripted_stem import SETTINGS, SLOPE_PA_PER_M, STEP_S, STROKE_M, ScriptedStem, drawn_stems

@@ -13,7 +13,7 @@ from config.serial_port import SerialPort
 from config.slave_file import SlaveFile
 from config.valve_file import shipped_valve
 from drivers.boundary import DriverError
-from drivers.canopen import only_watch, sdo
+from drivers.canopen import sdo, watching_driver
 from drivers.canopen.driver import CanopenDriver
 from drivers.canopen.node_bus import NodeBus
 from drivers.modbus_rtu import ModbusRtuDriver
@@ -160,7 +160,7 @@ def frames_at_the_driver(data: bytes) -> None:
     node = _node(bus.sent)
     bus.take = node.receive
     node.pass_time(0.0)
-    with mock.patch.object(only_watch, "device_sheet", return_value=_SHEET):
+    with mock.patch.object(watching_driver, "device_sheet", return_value=_SHEET):
         driver = CanopenDriver(_CANOPEN)
 
     def join(self: NodeBus, _identities: object) -> None:

@@ -19,8 +19,8 @@ from workbench.loops.causes import of_output_backwards
 from workbench.loops.joint import together
 from workbench.loops.literature_votes import Vote, he
 from workbench.loops.loop_diagnosis import output_alone
+from workbench.loops.loop_thresholds import LIMITS
 from workbench.loops.oscillation import find_oscillation
-from workbench.loops.thresholds import LIMITS
 
 OURS = "positioner"
 

@@ -19,7 +19,7 @@ answers: sticks (how much, how sure), something else (what), cannot be told (why
     remedies            what to do: retune or compensate, simulated on the identified loop
     plant               many loops: ranked, and which of them oscillate together
     loop_report         all of it as a page
-    thresholds          every number by which something is decided
+    loop_thresholds     every number by which something is decided
 """
 
 from workbench.loops.loop_diagnosis import LoopDiagnosis, diagnose_loop

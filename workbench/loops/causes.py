@@ -1,6 +1,6 @@
 """Causes held against each other by the likelihood of PV, each told the output that is on record.
 
-This is the evidence. The verdict comes from it in `loop_diagnosis`, by the numbers of `thresholds`.
+This is the evidence. The verdict comes from it in `loop_diagnosis`, by the numbers of `loop_thresholds`.
 
     friction        PV answers a stem that rests and slips
     linear          PV answers the output itself: tight tuning, or a disturbance that a valve without fault corrects
@@ -27,9 +27,9 @@ import numpy.typing as npt
 
 from workbench.loops.calibration import Evidence, Witness, mean_witness
 from workbench.loops.loop_record import Array, LoopRecord, averaged
+from workbench.loops.loop_thresholds import LIMITS
 from workbench.loops.oscillation import Oscillation
 from workbench.loops.stem_and_process import cost_of, costs_of_stems, respond, rest_positions
-from workbench.loops.thresholds import LIMITS
 
 CAUSES_FORM = 4
 """To be raised when causes would come out differently: what was kept is then made anew."""

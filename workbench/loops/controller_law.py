@@ -10,7 +10,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from workbench.loops.loop_record import LoopRecord
-from workbench.loops.thresholds import LIMITS
+from workbench.loops.loop_thresholds import LIMITS
 
 
 @dataclass(frozen=True, slots=True)

@@ -13,7 +13,7 @@ import numpy as np
 from workbench.loops.calibration import CALIBRATION, mean_evidence
 from workbench.loops.causes import Size
 from workbench.loops.loop_diagnosis import LoopDiagnosis
-from workbench.loops.thresholds import LIMITS
+from workbench.loops.loop_thresholds import LIMITS
 
 
 @dataclass(frozen=True, slots=True)

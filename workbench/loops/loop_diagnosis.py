@@ -1,6 +1,6 @@
 """The verdict on one loop: it sticks (how much), something else (what), or it cannot be told (why, what would tell).
 
-The evidence comes from `causes`, the limits from `thresholds`.
+The evidence comes from `causes`, the limits from `loop_thresholds`.
 """
 
 from collections.abc import Callable, Mapping
@@ -17,10 +17,10 @@ from workbench.loops.causes import Causes, Rows, fitted_path, hold_causes, of_ou
 from workbench.loops.controller_law import ControllerLaw, see_law
 from workbench.loops.literature_votes import Vote, votes
 from workbench.loops.loop_record import LoopRecord
+from workbench.loops.loop_thresholds import LIMITS
 from workbench.loops.oscillation import Oscillation, find_oscillation
 from workbench.loops.quality_gates import Gate, closed_gates
 from workbench.loops.remedies import Remedy, find_remedies
-from workbench.loops.thresholds import LIMITS
 
 if TYPE_CHECKING:
     from matplotlib.figure import Figure

@@ -8,7 +8,7 @@ import numpy.typing as npt
 from config.errors import InputError
 from config.results.result import Brief
 from workbench.imports.loop_reader import LoopSamples
-from workbench.loops.thresholds import LIMITS
+from workbench.loops.loop_thresholds import LIMITS
 
 Array = npt.NDArray[np.float64]
 

@@ -11,7 +11,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from workbench.loops.loop_record import Array
-from workbench.loops.thresholds import LIMITS
+from workbench.loops.loop_thresholds import LIMITS
 
 POWER = 0.6
 """Share of the power at longer periods than the time scale: a little more than half, against drifts."""

@@ -29,8 +29,8 @@ from workbench.imports.loop_reader import ROLES, read_loop
 from workbench.loops.causes import CAUSES_FORM, Causes
 from workbench.loops.loop_diagnosis import LoopDiagnosis, diagnose_loop
 from workbench.loops.loop_record import LoopRecord
+from workbench.loops.loop_thresholds import LIMITS
 from workbench.loops.oscillation import without_trend
-from workbench.loops.thresholds import LIMITS
 
 
 @dataclass(frozen=True, slots=True)

@@ -6,8 +6,8 @@ from dataclasses import dataclass
 import numpy as np
 
 from workbench.loops.loop_record import Array, LoopRecord
+from workbench.loops.loop_thresholds import LIMITS
 from workbench.loops.oscillation import POWER, Oscillation
-from workbench.loops.thresholds import LIMITS
 
 
 @dataclass(frozen=True, slots=True)

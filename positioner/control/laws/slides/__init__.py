@@ -1,7 +1,7 @@
 """The law of slides: a stem that slides into rest lands where spring and friction balance, however slow the loop.
 
     slide_law           the law: begin, observe, command
-    states              its states, a type each
+    slide_states        its states, a type each
     transitions         which state follows which, and when: one table
     plan                one slide, or two by way of an excursion
     teaching            what a slide taught of break-away

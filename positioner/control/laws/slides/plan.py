@@ -29,7 +29,7 @@ from config.codes import InhibitReason
 from positioner.control.laws.slides.now import Now
 from positioner.control.laws.slides.slide_bounds import DAY_S, SlideBounds
 from positioner.control.laws.slides.slide_memory import SlideMemory
-from positioner.control.laws.slides.states import Out, Slide
+from positioner.control.laws.slides.slide_states import Out, Slide
 from positioner.estimation.landings.breakaway_distance import Interval
 from positioner.estimation.landings.landing_detector import VISIBLE
 from positioner.estimation.landings.packing_compliance import compliance

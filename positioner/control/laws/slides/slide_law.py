@@ -19,7 +19,7 @@ from positioner.control.laws.slides.reference_course import ReferenceCourse
 from positioner.control.laws.slides.slide_bounds import DAY_S, SlideBounds
 from positioner.control.laws.slides.slide_memory import Move, SlideMemory
 from positioner.control.laws.slides.slide_pressure import Balance
-from positioner.control.laws.slides.states import Idle, Out, Watching
+from positioner.control.laws.slides.slide_states import Idle, Out, Watching
 from positioner.control.laws.slides.teaching import after_outcome
 from positioner.control.laws.slides.transitions import after
 from positioner.control.valve_knowledge import ValveKnowledge

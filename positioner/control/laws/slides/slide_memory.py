@@ -5,15 +5,8 @@ from dataclasses import dataclass, replace
 from config.codes import InhibitReason
 from positioner.control.laws.slides.reference_course import ReferenceCourse
 from positioner.control.laws.slides.slide_bounds import SlideBounds
-from positioner.control.laws.slides.states import WATCHING, Idle, Slide, State, Watching
+from positioner.control.laws.slides.slide_states import WATCHING, Idle, Slide, State, Watching
 from positioner.estimation.landings.breakaway_distance import BreakawayDistance
-
-ENDS_BY_TIME = (
-    InhibitReason.REFERENCE_COMES,
-    InhibitReason.EXCURSION_WAITS,
-    InhibitReason.EXCURSION_BUDGET_SPENT,
-)
-"""Reasons to be idle that no longer hold after some time."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -114,7 +107,7 @@ class SlideMemory:
 
     def stands(self, now_s: float, bounds: SlideBounds) -> bool:
         """Whether a plan that finds nothing to do finds nothing later: no wait, no references and no slides come."""
-        waits = isinstance(self.state, Idle) and self.state.reason in ENDS_BY_TIME
+        waits = isinstance(self.state, Idle) and self.state.waits
         comes = self.course is not None and not self.course.rests(now_s)
         return not (waits or comes) and self.move.refilled(now_s, bounds) is self.move
 

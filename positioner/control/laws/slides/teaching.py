@@ -15,7 +15,7 @@ from positioner.control.laws.slides.now import Now
 from positioner.control.laws.slides.plan import shortest_seen_m
 from positioner.control.laws.slides.slide_bounds import SlideBounds
 from positioner.control.laws.slides.slide_memory import Anchor, Move, Row, SlideMemory
-from positioner.control.laws.slides.states import Presliding, Slide, slide_of
+from positioner.control.laws.slides.slide_states import Presliding, Slide, slide_of
 from positioner.estimation.landings.breakaway_distance import Went
 from positioner.estimation.landings.landing_detector import SlideOutcome
 

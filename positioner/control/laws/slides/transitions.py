@@ -23,7 +23,7 @@ from config.codes import InhibitReason
 from positioner.control.laws.slides.now import Now
 from positioner.control.laws.slides.plan import Plan, shortest_seen_m
 from positioner.control.laws.slides.slide_memory import Excursions, Move, Row, SlideMemory
-from positioner.control.laws.slides.states import Idle, Out, Presliding, Slide, Sliding, State, Watching, slide_of
+from positioner.control.laws.slides.slide_states import Idle, Out, Presliding, Slide, Sliding, State, Watching, slide_of
 from positioner.control.laws.slides.teaching import sent_elsewhere, slid_away
 from positioner.estimation.landings.landing_detector import STOP
 from positioner.estimation.landings.stem_at_rest import Rest
@@ -170,7 +170,7 @@ def taken_back(plan: Plan) -> SlideMemory | None:
         return None
     away_s = memory.excursions.away_s if memory.excursions is not None else 0.0
     takes_back = course.takes_back(now.now_s, now.error_m, plan.way_m(now.side), away_s)
-    return _idle(memory, InhibitReason.REFERENCE_COMES) if takes_back else None
+    return _idle(memory, InhibitReason.REFERENCE_COMES, waits=True) if takes_back else None
 
 
 def excursion_waits(plan: Plan) -> SlideMemory | None:
@@ -178,7 +178,7 @@ def excursion_waits(plan: Plan) -> SlideMemory | None:
     now, before = plan.now, plan.memory.excursions
     if before is None or now.now_s - before.begun_s >= now.bounds.excursion_interval_s:
         return None
-    return None if plan.used_up or plan.left_away else _idle(plan.memory, InhibitReason.EXCURSION_WAITS)
+    return None if plan.used_up or plan.left_away else _idle(plan.memory, InhibitReason.EXCURSION_WAITS, waits=True)
 
 
 def two_slides(plan: Plan) -> SlideMemory | None:
@@ -210,7 +210,7 @@ def two_slides(plan: Plan) -> SlideMemory | None:
 def day_spent(plan: Plan) -> SlideMemory | None:
     """Wait until what a day's excursions may cost has come back."""
     spent = plan.memory.move.left >= 2 and any(bar is InhibitReason.EXCURSION_BUDGET_SPENT for _, bar in plan.bars)
-    return _idle(plan.memory, InhibitReason.EXCURSION_BUDGET_SPENT) if spent else None
+    return _idle(plan.memory, InhibitReason.EXCURSION_BUDGET_SPENT, waits=True) if spent else None
 
 
 def nothing_breaks_loose(plan: Plan) -> SlideMemory | None:
@@ -294,11 +294,15 @@ def _slide(plan: Plan, sent: Slide) -> SlideMemory:
     )
 
 
-def _idle(memory: SlideMemory, reason: InhibitReason) -> SlideMemory:
-    """Return the memory of a stem that is left alone: the same one, if it is already, as in most steps."""
+def _idle(memory: SlideMemory, reason: InhibitReason, *, waits: bool = False) -> SlideMemory:
+    """Return the memory of a stem that is left alone: the same one, if it is already, as in most steps.
+
+    Args:
+        waits: whether the reason ends by time alone.
+    """
     if isinstance(memory.state, Idle) and memory.state.reason is reason:
         return memory
-    return replace(memory, state=Idle(reason))
+    return replace(memory, state=Idle(reason, waits))
 
 
 class Rule(NamedTuple):

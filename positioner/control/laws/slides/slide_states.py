@@ -45,6 +45,8 @@ class Idle:
     """Nothing is under way, for a reason, or because the stem is where it shall be."""
 
     reason: InhibitReason = InhibitReason.NOTHING
+    waits: bool = False
+    """Whether the reason ends by time alone."""
 
 
 @dataclass(frozen=True, slots=True)

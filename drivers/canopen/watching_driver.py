@@ -7,9 +7,9 @@ from config.canopen_device import CanopenDevice
 from drivers.boundary import Capabilities, Reading, Refused
 from drivers.canopen.events import NodeEvent
 from drivers.canopen.node_bus import SDO_ANSWER, NodeBus
+from drivers.canopen.node_configuration import NodeConfiguration
 from drivers.canopen.pdo import PdoExchange
 from drivers.canopen.sdo import ILLEGAL_VALUE, SdoTransfers, device_sheet
-from drivers.canopen.wanted_settings import NodeConfiguration
 from drivers.canopen.watcher import NodeWatcher
 
 
