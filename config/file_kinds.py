@@ -13,6 +13,8 @@ from config.errors import InputError
 FileKind = Literal["valve", "slave", "daemon"]
 OF_SLAVE = frozenset({"bus", "sensor", "clock", "initial"})
 """Tables that only a slave's file has."""
+VALVE_SAID = "a valve file, or a shipped valve: ordinary, rotary, seed (the paper's)"
+"""What a command line says of a valve that it takes."""
 
 
 def require_kind(tables: Mapping[str, Any], wanted: FileKind, source: str) -> None:

@@ -7,6 +7,7 @@ as on the wire; many tools print them from 1. `Register.writer` is the role that
 
 import math
 from dataclasses import dataclass, replace
+from difflib import get_close_matches
 from itertools import chain
 from typing import Literal
 
@@ -373,6 +374,9 @@ SIZE = max(register.end for register in REGISTERS)
 """Addresses from 0 to here (exclusive) may be read; those that hold nothing read 0."""
 
 
+LISTED = "`positioner map` lists all"
+
+
 def register_named(name: str) -> Register:
     """Return the register of that name.
 
@@ -384,4 +388,5 @@ def register_named(name: str) -> Register:
     if name.endswith(".toml"):
         raise InputError(name, "no register, but a file; the daemon's is given as --config FILE")
     near = [each for each in BY_NAME if name.lower() in each or each in name.lower()]
-    raise InputError(name, f"no register of that name; allowed: {', '.join(near or BY_NAME)}")
+    near = near or get_close_matches(name.lower(), BY_NAME)
+    raise InputError(name, f"no register of that name; {'near: ' + ', '.join(near) if near else LISTED}")

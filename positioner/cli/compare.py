@@ -3,6 +3,7 @@
 import argparse
 from pathlib import Path
 
+from config.file_kinds import VALVE_SAID
 from positioner.cli.parts.fit_arguments import add_noise_and_exports, read_with_noise
 from positioner.cli.parts.given_names import naming
 from positioner.cli.parts.model_arguments import read_valve
@@ -16,7 +17,7 @@ EXAMPLE = "positioner compare rec.csv --valve seed --report compared.html"
 def add_arguments(parser: argparse.ArgumentParser) -> None:
     """Declare the command line."""
     parser.add_argument("recording", type=Path, metavar="REC", help="a recording, CSV or Parquet")
-    parser.add_argument("--valve", required=True, metavar="VALVE.toml", help="a valve file, or a shipped valve's name")
+    parser.add_argument("--valve", required=True, metavar="VALVE.toml", help=VALVE_SAID)
     parser.add_argument("--json", type=Path, metavar="FILE", help="write all numbers as JSON")
     parser.add_argument("--report", type=Path, metavar="FILE.html", help="write a report for a browser")
     add_noise_and_exports(parser)

@@ -9,6 +9,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING
 
 from config.errors import CommandFailed, InputError
+from config.file_kinds import VALVE_SAID
 from positioner.cli.parts.export_arguments import mapping_of
 from positioner.cli.parts.fit_arguments import add_noise_and_exports, add_pressure, add_test, read_fitted
 from positioner.cli.parts.given_names import files_named, naming
@@ -34,7 +35,7 @@ PREVIEWED = 5  # effects in the line of the preview
 def add_arguments(parser: argparse.ArgumentParser) -> None:
     """Declare the command line."""
     parser.add_argument("recordings", type=Path, nargs="+", metavar="REC", help="recordings, CSV or Parquet")
-    parser.add_argument("--valve", required=True, metavar="VALVE.toml", help="a valve file, or a shipped valve's name")
+    parser.add_argument("--valve", required=True, metavar="VALVE.toml", help=VALVE_SAID)
     add_test(parser)
     parser.add_argument(
         "--effects",

@@ -5,6 +5,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING
 
 from config.errors import InputError
+from config.file_kinds import VALVE_SAID
 from positioner.cli.parts.fit_arguments import add_noise_and_exports, add_pressure, add_test, read_fitted
 from positioner.cli.parts.given_names import files_named, naming
 from positioner.cli.parts.model_arguments import read_valve
@@ -24,7 +25,7 @@ SHOWN_FORMS = 5  # forms that are printed
 def add_arguments(parser: argparse.ArgumentParser) -> None:
     """Declare the command line."""
     parser.add_argument("recordings", type=Path, nargs="+", metavar="REC", help="recordings, CSV or Parquet")
-    parser.add_argument("--valve", required=True, metavar="VALVE.toml", help="a valve file, or a shipped valve's name")
+    parser.add_argument("--valve", required=True, metavar="VALVE.toml", help=VALVE_SAID)
     add_test(parser)
     parser.add_argument(
         "-o", "--out", type=Path, metavar="FORM.py", help="write the formula as an effect's file, for `extend`"

@@ -6,6 +6,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING
 
 from config.errors import InputError
+from config.file_kinds import VALVE_SAID
 from positioner.cli.parts.breaking_off import end_as_by_ctrl_c, tell_when_broken_off
 from positioner.cli.parts.config_argument import add_config, config_file
 from positioner.cli.parts.daemon_address import add_tls
@@ -33,7 +34,7 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
     """Declare the command line."""
     add_config(parser, text="the running daemon's file, with [recorder]")
     parser.add_argument("--rec", type=Path, nargs="+", required=True, metavar="REC", help="recordings, CSV or Parquet")
-    parser.add_argument("--valve", required=True, metavar="VALVE.toml", help="a valve file, or a shipped valve's name")
+    parser.add_argument("--valve", required=True, metavar="VALVE.toml", help=VALVE_SAID)
     add_test(parser)
     parser.add_argument("--effects", nargs="+", metavar="NAME", help="effects to try (all known effects)")
     add_pressure(parser)

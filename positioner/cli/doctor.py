@@ -31,10 +31,6 @@ MOST_LOST = 1
 """Of the readings: a line that loses more is to be looked at."""
 
 
-OF_A_VALVE = ("law", "bus", "sampling", "recorder", "memory")
-"""Checks whose lines name the valve, where a file has several."""
-
-
 class FailedCheck(Exception):
     """A check that failed, and why."""
 
@@ -59,10 +55,11 @@ def run(arguments: argparse.Namespace) -> int:
     well = passes("packages", "", check_packages)
     nudge_pa: float | None = arguments.nudge_pa
     nudged = () if nudge_pa is None else (("sampling", partial(_sampling, nudge_pa)),)
-    checks: list[tuple[str, Check, DaemonFile]] = [
+    valves = [(f"{file.valve.name}: " if len(files) > 1 else "", file) for file in files]
+    checks: list[tuple[str, str, Check, DaemonFile]] = [
         *(
-            (name, check, file)
-            for file in files
+            (name, valve, check, file)
+            for valve, file in valves
             for name, check in (
                 ("law", _law),
                 ("bus", check_bus),
@@ -72,7 +69,7 @@ def run(arguments: argparse.Namespace) -> int:
             )
         ),
         *(
-            (name, check, files[0])
+            (name, "", check, files[0])
             for name, check in (
                 ("supervisory", _supervisory),
                 ("history", _history),
@@ -81,13 +78,12 @@ def run(arguments: argparse.Namespace) -> int:
                 ("priority", _priority),
             )
         ),
-        *(("certificates", check_certificates, file) for file in files),
+        *(("certificates", valve, check_certificates, file) for valve, file in valves),
     ]
     for file in files:
         well = passes("config", "", partial(_config, file, path)) and well
     well = passes("load", "", partial(_load, files)) and well
-    for name, check, file in checks:
-        valve = f"{file.valve.name}: " if len(files) > 1 and name in OF_A_VALVE else ""
+    for name, valve, check, file in checks:
         well = passes(name, valve, partial(check, file, path)) and well
     return 0 if well else 1
 

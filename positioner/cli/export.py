@@ -3,6 +3,7 @@
 import argparse
 from pathlib import Path
 
+from config.file_kinds import VALVE_SAID
 from positioner.cli.parts.output_files import writable
 from positioner.cli.parts.progress import at_work
 
@@ -13,7 +14,7 @@ EXAMPLE = "positioner export fmu seed -o valve.fmu"
 def add_arguments(parser: argparse.ArgumentParser) -> None:
     """Declare the command line."""
     parser.add_argument("format", choices=["fmu"], help="the format")
-    parser.add_argument("valve", metavar="VALVE.toml", help="a valve file, or the name of a shipped valve")
+    parser.add_argument("valve", metavar="VALVE.toml", help=VALVE_SAID)
     parser.add_argument("-o", "--out", type=Path, required=True, metavar="VALVE.fmu", help="the FMU")
 
 

@@ -4,6 +4,7 @@ import argparse
 import time
 from pathlib import Path
 
+from config.file_kinds import VALVE_SAID
 from positioner.cli.parts.fit_arguments import add_noise_and_exports, add_pressure, add_test, read_fitted
 from positioner.cli.parts.given_names import files_named, naming
 from positioner.cli.parts.model_arguments import read_valve, require_effects
@@ -16,7 +17,7 @@ EXAMPLE = "positioner extend seed --effect backlash --fit rec.csv -o new.toml"
 
 def add_arguments(parser: argparse.ArgumentParser) -> None:
     """Declare the command line."""
-    parser.add_argument("valve", metavar="VALVE.toml", help="a valve file, or a shipped valve's name")
+    parser.add_argument("valve", metavar="VALVE.toml", help=VALVE_SAID)
     parser.add_argument(
         "--effect",
         nargs="+",

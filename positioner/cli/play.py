@@ -9,6 +9,7 @@ from typing import TYPE_CHECKING
 
 from config.codes import Mode
 from config.errors import CommandFailed, InputError
+from config.file_kinds import VALVE_SAID
 from config.law_names import DEFAULT_LAW, law_names
 from positioner.cli.parts.extended_valves import load_extended_valve
 from positioner.cli.parts.model_arguments import read_valve
@@ -36,7 +37,7 @@ ROUNDING_S = 1e-9
 
 def add_arguments(parser: argparse.ArgumentParser) -> None:
     """Declare the command line."""
-    parser.add_argument("valve", metavar="VALVE.toml", help="a valve file, or the name of a shipped valve")
+    parser.add_argument("valve", metavar="VALVE.toml", help=VALVE_SAID)
     parser.add_argument(
         "--reference", type=Path, required=True, metavar="REF.csv", help="columns time_s and reference_m"
     )

@@ -3,6 +3,7 @@
 import argparse
 from pathlib import Path
 
+from config.file_kinds import VALVE_SAID
 from positioner.cli.parts.given_names import naming
 from positioner.cli.parts.model_arguments import read_valve
 from positioner.cli.parts.output_files import recording_writable
@@ -14,7 +15,7 @@ EXAMPLE = "positioner simulate seed.toml --input pressure.csv --noise-m 1e-5 -o 
 
 def add_arguments(parser: argparse.ArgumentParser) -> None:
     """Declare the command line."""
-    parser.add_argument("valve", metavar="VALVE.toml", help="a valve file, or the name of a shipped valve")
+    parser.add_argument("valve", metavar="VALVE.toml", help=VALVE_SAID)
     parser.add_argument(
         "--input",
         type=Path,

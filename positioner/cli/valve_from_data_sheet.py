@@ -34,7 +34,7 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
     )
     parser.add_argument("--mass-kg", type=float, metavar="KG", help="mass of plate, stem and plug (8 at 700 cm2)")
     parser.add_argument("--name", default="from data sheet", help="name of the valve")
-    parser.add_argument("--of", metavar="VALVE.toml", help="begin with this valve file, or a shipped valve's name")
+    parser.add_argument("--of", metavar="VALVE.toml", help="begin with this valve file, or a shipped valve")
     parser.add_argument(
         "--set",
         nargs="+",

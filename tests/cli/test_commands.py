@@ -267,7 +267,9 @@ def test_words_that_no_command_takes_are_one_line(
 @pytest.mark.parametrize(
     ("words", "said"),
     [
-        (["get", "positio"], "positio: no register of that name; allowed: position"),
+        (["get", "positio"], "positio: no register of that name; near: position, position_scaled, position_m, "),
+        (["get", "refrence"], "refrence: no register of that name; near: reference, "),
+        (["get", "zzz"], "zzz: no register of that name; `positioner map` lists all"),
         (["get", "daemon.toml"], "daemon.toml: no register, but a file; the daemon's is given as --config FILE"),
         (["fleet", "plant.csv", "--since", "noon"], "--since: must be a date YYYY-MM-DD, or with a time, got 'noon'"),
         (
@@ -440,10 +442,10 @@ def test_every_command_that_listens_says_where_in_the_same_words(command: str) -
     assert (said.listen_host, said.listen_port) == ("::1", 7)
 
 
-@pytest.mark.parametrize(("words", "given"), [(["probe"], 0), (["run", "a.toml", "--config", "b.toml"], 2)])
-def test_a_command_needs_its_file_once(words: list[str], given: int, capsys: Capture) -> None:
+@pytest.mark.parametrize(("words", "given"), [(["probe"], "none"), (["run", "a.toml", "--config", "b.toml"], "2")])
+def test_a_command_needs_its_file_once(words: list[str], given: str, capsys: Capture) -> None:
     assert main(words) == 2
-    assert f"CONFIG.toml: is required, once; {given} were given" in capsys.readouterr().err
+    assert f"CONFIG.toml: one file is needed, got {given}" in capsys.readouterr().err
 
 
 def test_a_process_that_may_open_no_more_files_says_so_in_a_line(

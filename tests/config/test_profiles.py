@@ -4,6 +4,7 @@ import tomllib
 
 from config.daemon_file import DaemonFile, load_daemon
 from config.device import ModbusTcpDevice
+from config.file_kinds import VALVE_SAID
 from config.loading import SHIPPED
 from config.slave_file import ModbusTcpBus, load_slave
 from config.valve_file import load_valve, shipped_valve
@@ -47,3 +48,7 @@ def test_the_profiles_of_an_ordinary_valve_are_those_of_one_device() -> None:
     assert slave.sensor.quantum_m == daemon.valve.stroke_m / 4096 == daemon.device.map.position_m.scale
     assert daemon.device.reply_timeout_s < daemon.cycle.period_s < daemon.safety.stale_after_s
     assert (daemon.control.law, daemon.law) == ("slides", None)
+
+
+def test_help_names_every_shipped_valve() -> None:
+    assert [each.stem for each in sorted((SHIPPED / "valves").glob("*.toml")) if each.stem not in VALVE_SAID] == []

@@ -350,8 +350,10 @@ def test_probe_and_doctor_name_the_valve(
     assert "FV-4 holds 32000.0 Pa" in capsys.readouterr().out
     monkeypatch.setattr(doctor, "PERIODS", 50)  # the machine's timing is no matter here
     main(["doctor", str(site.path)])
-    checked = [line for line in capsys.readouterr().out.splitlines() if line.startswith("bus ")]
-    assert [name in line for name, line in zip(NAMES, checked, strict=True)] == [True] * VALVES
+    lines = capsys.readouterr().out.splitlines()
+    for check in ("bus", "certificates"):
+        checked = [line for line in lines if line.startswith(f"{check} ")]
+        assert [name in line for name, line in zip(NAMES, checked, strict=True)] == [True] * VALVES
 
 
 def test_a_device_that_hangs_stops_its_own_cycle_only(site: Site) -> None:

@@ -3,6 +3,7 @@
 import argparse
 from pathlib import Path
 
+from config.file_kinds import VALVE_SAID
 from webpage.listening_arguments import add_page, listening
 
 HELP = "open the workbench in a browser: compare, diagnose, add what is missing"
@@ -12,7 +13,7 @@ EXAMPLE = "positioner workbench rec.csv --valve seed"
 def add_arguments(parser: argparse.ArgumentParser) -> None:
     """Declare the command line."""
     parser.add_argument("recordings", type=Path, nargs="*", metavar="REC", help="recordings, or folders with some")
-    parser.add_argument("--valve", metavar="VALVE.toml", help="a valve file, or a shipped valve's name")
+    parser.add_argument("--valve", metavar="VALVE.toml", help=VALVE_SAID)
     add_page(parser)
 
 

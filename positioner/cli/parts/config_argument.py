@@ -46,5 +46,5 @@ def config_file(arguments: argparse.Namespace) -> Path:
 
     said = config_files(arguments)
     if len(said) != 1:
-        raise InputError(METAVAR, f"is required, once; {len(said)} were given")
+        raise InputError(METAVAR, f"one file is needed, got {len(said) or 'none'}")
     return said[0]

@@ -77,7 +77,7 @@ def checked(arguments: argparse.Namespace) -> "DaemonFile | None":
             raise InputError(f"--{option.replace('_', '-')}", f"allowed is a positive number, got {value:g}")
     given = config_files(arguments)
     if len(given) > 1 or (not given and not getattr(arguments, "rec", None)):
-        raise InputError("CONFIG.toml", f"is required, once; {len(given)} were given")
+        raise InputError("CONFIG.toml", f"one file is needed, got {len(given) or 'none'}")
     if given:
         arguments.config = given[0]
         file = load_daemon(given[0], arguments.name)
