@@ -144,7 +144,8 @@ def _tell_experiment(diagnosis: "Diagnosis", path: Path | None) -> None:
     if diagnosis.experiment is None:
         return
     if path is None:
-        print("--experiment FILE writes the experiment")
+        if diagnosis.experiment.separates:
+            print("--experiment FILE writes the experiment")
         return
     diagnosis.experiment.write(path)
     print(f"{path}: the experiment")

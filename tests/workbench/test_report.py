@@ -191,6 +191,16 @@ def test_the_experiment_is_drawn(diagnosed: tuple[Diagnosis, Subject], tmp_path:
         assert said in page.words
 
 
+def test_an_experiment_that_separates_nothing_is_not_asked_for(
+    diagnosed: tuple[Diagnosis, Subject], tmp_path: Path
+) -> None:
+    useless = Experiment("staircase", 0.97, np.arange(4.0), np.array([1e4, 2e4, 3e4, 1e4]))
+    path = tmp_path / "useless.html"
+    report_diagnosis(replace(diagnosed[0], experiment=useless), path, diagnosed[1], ["positioner extend <one>"])
+    assert "plot-experiment" not in read(path).figures
+    assert "no input of the menu tells all rivals apart" in replace(diagnosed[0], experiment=useless).summary()
+
+
 def test_plotly_knows_all_that_is_drawn(page: Page, diagnosed_page: Page) -> None:
     from plotly import graph_objects
 

@@ -169,10 +169,7 @@ class Diagnosis(Result, ForwardSelection[EvaluatedModel, EffectCandidate]):
             )
             said.append(candidate_table([each.tried for each in step.candidates], lengths(self.kind), title))
         if self.experiment:
-            said.append(
-                f"experiment: {self.experiment.name}; a refit of the wrong rival leaves "
-                f"{self.experiment.separation:.3g} times the noise, the right one about 1"
-            )
+            said.append(f"experiment: {self.experiment.sentence}")
         return said + [f"not detectable: {each.sentence}" for each in undetectable(self.split, self.best.fit.valve)]
 
     def frame_columns(self) -> dict[str, list[object]]:

@@ -226,7 +226,7 @@ class SearchPanel:
                     button.on_click(lambda effects=effects: self._add(search, effects))
                     button.props('no-caps data-testid="add"')
             if diagnosis.experiment is not None:
-                ui.label(f"An experiment that tells them apart: {diagnosis.experiment.name}.")
+                ui.label(f"Experiment: {diagnosis.experiment.sentence}.")
             for number, step in enumerate(diagnosis.steps, start=1):
                 before = self._desk.errors.shown(step.before.errors.test_rmse_m).text
                 with ui.row().classes("items-baseline").style("gap: 6px"):

@@ -268,15 +268,14 @@ def _next(diagnosis: Diagnosis, commands: Sequence[str]) -> page.Html:
     chosen = diagnosis.experiment
     adding = (page.text("To add what is missing, type:" if len(commands) == 1 else "To add one of them, type:"),)
     acting = (*adding, page.keep_lines("\n".join(commands))) if commands else ()
-    if chosen is None:
+    if chosen is None or not chosen.separates:
         return page.section("next", "What to do next", *acting, page.bullets(_advice(diagnosis)))
     return page.section(
         "next",
         "What to do next",
         page.text(
-            f"Play this command to the valve: {chosen.name}. Of a menu of commands it tells the rivals apart best: "
-            f"refitted to the answer, the wrong rival leaves an error of {chosen.separation:.3g} times the sensor's "
-            "noise, the right one about 1. It stays within the pressures of the recording and begins at rest.",
+            f"Play this command to the valve: {chosen.sentence}. It stays within the pressures of the recording and "
+            "begins at rest.",
         ),
         page.plot(
             "plot-experiment",
