@@ -28,7 +28,7 @@ FORKS.set_forkserver_preload(
         "drivers.modbus_tcp",
         "drivers.modbus_rtu",
         "drivers.canopen.driver",
-        "sim.slave.kernel_preloading",
+        "tests.kernel_preloading",
     ]
 )
 

@@ -10,7 +10,6 @@ Its files:
     site_files                   the files that they are given
     child_process                a process of ours: its ready line, questions to it, its end
     tied                         in a child: be a module, and end with whoever started it
-    forked, fork_server          such a process forked off one that has loaded all it needs; that one
     agent                        in a child: asks a device or a daemon for a test
     fault_proxy, wire_faults     in a child: a wire for Modbus TCP that is spoilt on demand; how
 """

@@ -13,8 +13,6 @@ from contextlib import contextmanager, suppress
 from pathlib import Path
 from typing import Any
 
-from positioner.testing.forked import Forked, fork_server
-
 HOME = Path(__file__).resolve().parents[2]
 CHILD_END_WITHIN_S = 10.0
 
@@ -33,28 +31,23 @@ class ChildProcess:
     Args:
         module, words: what is run.
         log: where its standard error goes.
-        forked: off a process that has loaded ours; where that cannot be, from nothing.
 
     Raises:
         NotStarted: it ended before.
     """
 
-    def __init__(self, module: str, *words: str, log: Path, forked: bool = False) -> None:
+    def __init__(self, module: str, *words: str, log: Path) -> None:
         path = os.pathsep.join(filter(None, (str(HOME), os.environ.get("PYTHONPATH", ""))))
         environment = {**os.environ, "PYTHONPATH": path}
-        self._process: subprocess.Popen[str] | Forked
         with log.open("w") as error:
-            if forked and sys.platform == "linux":
-                self._process = fork_server(path).start(module, words, environment, error)
-            else:
-                self._process = subprocess.Popen(
-                    [sys.executable, "-P", "-m", module, *words],
-                    stdin=subprocess.PIPE,
-                    stdout=subprocess.PIPE,
-                    stderr=error,
-                    text=True,
-                    env=environment,
-                )
+            self._process = subprocess.Popen(
+                [sys.executable, "-P", "-m", module, *words],
+                stdin=subprocess.PIPE,
+                stdout=subprocess.PIPE,
+                stderr=error,
+                text=True,
+                env=environment,
+            )
         assert self._process.stdin is not None
         assert self._process.stdout is not None
         self._in, self._out = self._process.stdin, self._process.stdout
@@ -106,12 +99,12 @@ class ChildProcess:
 
 @contextmanager
 def launch(module: str, *words: str, log: Path) -> Iterator[ChildProcess]:
-    """Fork a process of ours; make sure that it ends.
+    """Start a process of ours; make sure that it ends.
 
     Raises:
         NotStarted: it ended instead of getting ready.
     """
-    process = ChildProcess(module, *words, log=log, forked=True)
+    process = ChildProcess(module, *words, log=log)
     try:
         yield process
     finally:
@@ -132,7 +125,7 @@ class Agent:
             NotDone: it could not.
         """
         if self._process is None:
-            self._process = ChildProcess(*self._words, log=self._log, forked=True)
+            self._process = ChildProcess(*self._words, log=self._log)
         return self._process.ask(call, **given)
 
     def end(self) -> None:

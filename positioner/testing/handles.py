@@ -10,7 +10,8 @@ from typing import Any, Self
 
 from positioner.testing.child_process import Agent, ChildProcess, NotDone, launch, port_in
 
-AGENT, COMMANDS, PROXY = "positioner.testing.agent", "positioner.cli", "positioner.testing.fault_proxy"
+AGENT, PROXY = "positioner.testing.agent", "positioner.testing.fault_proxy"
+COMMANDS = ("positioner.testing.tied", "positioner.cli")
 HOST = "127.0.0.1"
 HANDLE_POLL_S = 0.02
 
@@ -156,7 +157,7 @@ def slave_running(folder: Path, stroke_m: float, lockstep: bool) -> Iterator[Val
     """
     with ExitStack() as stack:
         file, log = str(folder / "slave.toml"), folder / "slave.log"
-        slave = stack.enter_context(launch(COMMANDS, "sim", file, "--listen-port", "0", log=log))
+        slave = stack.enter_context(launch(*COMMANDS, "sim", file, "--listen-port", "0", log=log))
         port = port_in(slave.ready)
         agent = Agent(AGENT, "device", str(port), log=folder / "slave_agent.log")
         stack.callback(agent.end)
@@ -171,7 +172,7 @@ def daemon_running(folder: Path) -> Iterator[PositionerDaemon]:
         NotStarted: it ended instead.
     """
     with ExitStack() as stack:
-        daemon = stack.enter_context(launch(COMMANDS, "run", str(folder / "daemon.toml"), log=folder / "daemon.log"))
+        daemon = stack.enter_context(launch(*COMMANDS, "run", str(folder / "daemon.toml"), log=folder / "daemon.log"))
         port = port_in(daemon.ready)
         agent = Agent(AGENT, "daemon", str(port), log=folder / "daemon_agent.log")
         stack.callback(agent.end)

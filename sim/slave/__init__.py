@@ -9,5 +9,4 @@ Its files:
     rtu_server                                served on a serial line
     canopen_dictionary, canopen_node          laid out for CANopen; the node as pure logic
     canopen_slave                             the node on its bus
-    kernel_preloading                         what takes a slave the longest to load, for one that is forked
 """

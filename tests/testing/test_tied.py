@@ -1,4 +1,4 @@
-"""A process that a command starts for itself ends with the command, also where that is killed."""
+"""A process that a command or a fixture starts for itself ends with it, also where that is killed."""
 
 import subprocess
 import sys
@@ -6,17 +6,28 @@ import time
 from pathlib import Path
 
 import psutil
+import pytest
 
 GONE_WITHIN_S, LOOK_EVERY_S = 60.0, 0.02
-KILLED = """
+BY_A_COMMAND = """
 import os, signal
 from pathlib import Path
 import psutil
 from positioner.cli.parts.children import running
 
 with running("metrics", Path("daemon.toml"), "--listen-port", "0"):
-    (server,) = psutil.Process().children()
-    print(server.pid, flush=True)
+    print(*(each.pid for each in psutil.Process().children()), flush=True)
+    os.kill(os.getpid(), signal.SIGKILL)
+"""
+BY_A_FIXTURE = """
+import os, signal
+from pathlib import Path
+import psutil
+from positioner.testing.handles import slave_running
+
+with slave_running(Path(), 0.1016, lockstep=True) as slave:
+    slave.read()
+    print(*(each.pid for each in psutil.Process().children()), flush=True)
     os.kill(os.getpid(), signal.SIGKILL)
 """
 DAEMON = """
@@ -27,12 +38,16 @@ host = "127.0.0.1"
 """
 
 
-def test_a_process_ends_with_the_command_that_was_killed(tmp_path: Path) -> None:
+@pytest.mark.parametrize(("who", "children"), [(BY_A_COMMAND, 1), (BY_A_FIXTURE, 2)], ids=["command", "fixture"])
+def test_a_process_ends_with_whoever_was_killed_that_had_started_it(who: str, children: int, tmp_path: Path) -> None:
     (tmp_path / "daemon.toml").write_text(DAEMON)
-    done = subprocess.run([sys.executable, "-c", KILLED], cwd=tmp_path, capture_output=True, text=True, check=False)
+    (tmp_path / "slave.toml").write_text('valve = "seed"\n')
+    done = subprocess.run([sys.executable, "-c", who], cwd=tmp_path, capture_output=True, text=True, check=False)
     assert done.stderr == ""
     end_s = time.monotonic() + GONE_WITHIN_S
-    while _runs(int(done.stdout)):
+    started = [int(each) for each in done.stdout.split()]
+    assert len(started) == children
+    while any(map(_runs, started)):
         assert time.monotonic() < end_s
         time.sleep(LOOK_EVERY_S)
 
