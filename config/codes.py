@@ -118,7 +118,7 @@ class InhibitReason(Code):
     EXCURSION_BEYOND_LIMIT = 11, "a small move needs an excursion beyond [control] excursion_limit"
     EXCURSION_WAITS = 12, "a small move waits: the last excursion was too recent"
     STAIRCASE_IN_VAIN = 13, "the staircase of slides gave no static law (see its reason)"
-    EXCURSION_BUDGET_SPENT = 14, "a small move waits: the day's travel of the packing is spent"
+    EXCURSION_BUDGET_SPENT = 14, "a small move waits: the day's excursions are spent"
     REFERENCE_COMES = 15, "a small move waits: the reference keeps changing"
     RESTORED_WAITS = 17, "a reference waits until the stem rests: what was restored is provisional"
     RESTORED_CONTRADICTED = 18, "the first landings contradict what was restored: identify the valve"

@@ -116,7 +116,7 @@ COMMANDS = (
     _operable(
         "reference", 0, "float32", "p.u.", 0.0, 1.0, "opening asked for, or the signal that [travel] makes one of"
     ),
-    _operable("reference_scaled", 2, "uint16", "1e-4 p.u.", 0, 10000, "the same as a whole number"),
+    _operable("reference_scaled", 2, "uint16", "1e-4 p.u.", 0, 10000, "reference as a whole number"),
     replace(_writable("mode", 3, "uint16", "1", 0, 2, f"{texts(Mode)}; falls to hold on a fault"), codes=Mode),
     _writable("eta_1", 4, "uint16", "1", 0, 1, "0 switches the excitation on (state S3); the DCS ends it: 1"),
     _writable("eta_2", 5, "uint16", "1", 0, 1, "0 switches the parameter identifier on"),
@@ -135,15 +135,15 @@ STATUS = (
     _coded("quality", 102, Quality, "of the last measurement"),
     _coded("why", 103, InhibitReason, "why not as asked"),
     Register("position", 104, "float32", "p.u.", "opening, from the closed end"),
-    Register("position_scaled", 106, "int16", "1e-4 p.u.", "the same as a whole number"),
+    Register("position_scaled", 106, "int16", "1e-4 p.u.", "position as a whole number"),
     Register("device_status", 107, "uint16", "1", f"the device's own status word, bits: {list_bits(DeviceStatus)}"),
-    Register("position_m", 108, "float32", "m", "the same times the stroke; NaN: it turns"),
+    Register("position_m", 108, "float32", "m", "position times the stroke; NaN: the valve turns"),
     Register("pressure", 110, "float32", "Pa", "actuator pressure as measured"),
     Register("command", 112, "float32", "Pa", "pressure command"),
     Register("delta_r", 114, "float32", "p.u.", "last change of the reference, kept until the next"),
     Register("sample_age", 116, "float32", "s", "time since the last good measurement"),
     Register("reference_in_force", 118, "float32", "p.u.", "what the law follows; while it follows none, the stem"),
-    Register("position_deg", 134, "float32", "deg", "the same of a valve that turns; NaN: it has a stem"),
+    Register("position_deg", 134, "float32", "deg", "position of a valve that turns; NaN: it has a stem"),
     _coded("restored", 122, Restored, "what was known before the daemon was started"),
     Register("emergency", 124, "uint16", "1", "CANopen: error code of the device's last EMCY, 0 when it is over"),
     _coded("service", 125, ServiceState, "what the service does"),
@@ -151,9 +151,7 @@ STATUS = (
     Register(
         "reference_opening", 128, "float32", "p.u.", "opening that the reference asks for: split range, characteristic"
     ),
-    Register(
-        "position_signal", 130, "float32", "p.u.", "reference that asks for where the stem is: the same backwards"
-    ),
+    Register("position_signal", 130, "float32", "p.u.", "reference that would ask for the present position"),
     Register("dead_band", 132, "float32", "p.u.", "error at rest that is left alone, as in force"),
     Register("restored_agreed", 123, "uint16", "1", "landings since then that agree with it"),
 )
@@ -286,7 +284,9 @@ HEALTH = (
     _coded("ne107", 502, Ne107Status, "NAMUR NE 107"),
     _coded("ne107_cause", 503, Ne107Cause, "what decides ne107"),
     Register("ne107_causes", 504, "uint16", "1", "causes that hold: bit n - 1 is cause n of ne107_cause, 1 to 16"),
-    Register("ne107_causes_high", 505, "uint16", "1", "the same from 17 up: bit n - 17 is cause n"),
+    Register(
+        "ne107_causes_high", 505, "uint16", "1", "causes that hold, from 17 up: bit n - 17 is cause n of ne107_cause"
+    ),
     Register("friction", 506, "float32", "Pa", "Coulomb friction F_c / A as the law uses it; NaN: none yet"),
     Register("friction_baseline", 508, "float32", "Pa", "what it was when it was called normal; NaN: never"),
     Register("friction_ratio", 510, "float32", "1", "friction over its baseline; NaN: one is missing"),
@@ -303,10 +303,10 @@ HEALTH = (
         530,
         "float32",
         "1",
-        "the same under commands in the upper fifth of what the travel needs: the supply",
+        "pressure_short under commands in the upper fifth of what the travel needs: the supply",
     ),
     Register("end_closed", 532, "float32", "p.u.", "opening where the valve is pressed shut, mean of today"),
-    _coded("end_trend", 534, EndTrend, "of that over the last days"),
+    _coded("end_trend", 534, EndTrend, "of end_closed over the last days"),
     Register("exhausted", 536, "float32", "1", "air let out today, in volumes of the actuator at atmospheric pressure"),
     Register("moves_judged", 520, "uint32", "1", "moves behind the stiction index"),
 )

@@ -67,8 +67,9 @@ def _report(dcs: "Dcs", problem: str | None) -> int:
         print(f"\n[device] sampling, as found: {Sampling(int(law['sampling'])).text}")
     if int(law["ne107_causes_high"]) >> (Ne107Cause.ONE_DIRECTION - 17) & 1:
         print("\none direction is identified: k/c holds for it alone until the stem has moved the other way")
-    print("\napplied. [memory] folder in the daemon's file keeps it over a restart; without it, copy:")
-    print(f"[law]\nb_over_c_pa_per_m = {law['b_over_c_applied']:.7g}")
+    print("\napplied. [memory] folder in the daemon's file keeps it over a restart; without it, copy into that file:")
+    by_landings = "       # minus static_slope" if reasons["static_slope"] is Refusal.VALID else ""
+    print(f"[law]\nb_over_c_pa_per_m = {law['b_over_c_applied']:.7g}{by_landings}")
     print(f"k_over_c_pa = {law['k_over_c_applied']:.7g}")
     if law["offset_applied"]:
         print(f"offset_pa = {law['offset_applied']:.7g}")

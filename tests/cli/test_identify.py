@@ -33,4 +33,4 @@ def test_who_keeps_a_memory_is_not_told_to_type_a_law_in_which_would_set_it_asid
 ) -> None:
     monkeypatch.setattr("positioner.cli.identify.connect_dcs", lambda _: Identified())
     assert main(["identify"]) == 0
-    assert "without it, copy:\n[law]" in capsys.readouterr().out
+    assert "without it, copy into that file:\n[law]" in capsys.readouterr().out

@@ -45,5 +45,5 @@ def test_a_register_of_whole_numbers_refuses_others() -> None:
 
 
 def test_an_unknown_name_is_answered_with_near_ones() -> None:
-    with pytest.raises(InputError, match="allowed: position, position_m"):
+    with pytest.raises(InputError, match="near: position, position_m"):
         register_named("position_m_raw")

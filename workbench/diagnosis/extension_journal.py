@@ -45,9 +45,8 @@ class ExtensionStep(Schema):
         length = extension.extended.kind.length
         found, before, after = extension.gain, extension.refitted_errors, extension.extended_errors
         said = (
-            f"evidence {found.bic:.4g}; the error of the median held-out move goes from "
-            f"{length.number(before.test_block_m, '.4g')} to {length.said(after.test_block_m, '.4g')}, "
-            f"held-out evidence {found.held_out_evidence:.3g}"
+            f"evidence {found.bic:.4g}, held out {found.held_out_evidence:.3g}; error of the median held-out move: "
+            f"{length.number(before.test_block_m, '.4g')} before, {length.said(after.test_block_m, '.4g')} after"
         )
         floor_m = extension.split.floor_m
         left = "" if floor_m is None else f"; {after.rms_floors(floor_m):.3g} times the floor is left"

@@ -305,7 +305,7 @@ def _advice(diagnosis: Diagnosis) -> list[str]:
         advice.append("put the extended valve file into use, and compare it with a recording of another day")
     if diagnosis.verdict == "one_of":
         advice.append(
-            "no input tells these apart; measure the actuator pressure, or another quantity between the two effects"
+            "no command of the menu tells all of these apart; look at what the table above names, or measure it"
         )
     if diagnosis.verdict in ("unexplained", "untrusted"):
         advice.append(
