@@ -38,8 +38,9 @@ is solved exactly, however stiff, by the response g to an impulse (g(0) = 0, g'(
 
 for n = n_0 + n_1 tau / s + n_2 (tau / s)^2. On the bare valve beyond the Stribeck range n is a straight line: there a
 step has no error. The error estimate is what the quadratic term changes of v. Where that is too much, another force may
-damp the stem, and lambda = -dv'/dv, there, if that is more, is tried before the sub-step is halved: n then lacks that
-damping too, and is as smooth. Of a stem damped so, steps are exponential down to DAMPED / lambda.
+damp the stem, drive it or stiffen it: lambda = -dv'/dv and kappa = -dv'/dx, there (`linear_at`), are tried before the
+sub-step is halved: n then lacks that force too, and is as smooth. Of a stem damped so, steps are exponential down to
+DAMPED / lambda.
 
 The file is plain Python and runs as it stands: the bare valve. `sim.kernel` compiles this text, and in place of the
 functions at its end, which stand empty here, those that the effects of a valve file fill. All that is compiled must
@@ -70,8 +71,9 @@ SHORTEST_SUBSTEP = 2.0**-20
 EXPONENTIAL_ANGLE = 0.15
 """Angle, rad, of the undamped stem from which a sub-step is exponential: below it the pair is cheaper, and the closed
 form cancels."""
-MORE, DAMPED = 1.1, 0.5
-"""Damping, over that tried, that is worth another trial; lambda s from which a sub-step is exponential then."""
+OTHER, DAMPED = 0.1, 0.5
+"""Difference of damping, of that tried, that is worth another trial; lambda s from which a sub-step is exponential
+then."""
 FIRST_CHANGE = 0.2
 """Change of v, in |v| + v_s, that the first sub-step in the Stribeck range is made for: longer ones are refused."""
 BISECTIONS = 30
@@ -222,6 +224,15 @@ def bogacki_shampine(
     return x1, v1, a1, s * 0.125 * NINTH * abs(5.0 * a - 6.0 * a2 - 8.0 * a3 + 9.0 * a1)
 
 
+class Linear(NamedTuple):
+    """What is linear of a slide, x'' + lambda x' + kappa x = n."""
+
+    damping: float
+    """lambda, 1/s."""
+    kappa: float
+    """1/s^2."""
+
+
 class Response(NamedTuple):
     """Of x'' + lambda x' + kappa x = n: g, g', h of an impulse after s; I_0, I_1, I_2 of n = 1, tau / s, its square."""
 
@@ -257,16 +268,34 @@ def response(damping: float, kappa: float, s: float, g: float, slope: float) -> 
     return Response(g, slope, h, I_0, I_1, (1.0 - 2.0 * (I_0 * per_s + damping * I_1) * per_s) * per_kappa)
 
 
-def damping_at(valve: Karnopp, sigma: float, stem: Stem, a: float, q: Any, z: Any) -> float:
-    """Return lambda, 1/s, of a sliding stem with v' = a: of all that damps it; negative in the Stribeck range."""
-    dv = sigma * DIFFERENCE_V * (abs(stem.v) + valve.v_s)
+def linear_at(valve: Karnopp, sigma: float, stem: Stem, a: float, q: Any, z: Any) -> Linear:
+    """Return lambda and kappa, there, of a sliding stem with v' = a; what drives or loosens it is left to n.
+
+    A negative lambda, as in the Stribeck range, would grow over a step beyond all numbers.
+    """
+    dv, dx = sigma * DIFFERENCE_V * (abs(stem.v) + valve.v_s), sigma * DIFFERENCE_M
     faster = acceleration(valve, SLIP, sigma, Stem(stem.t, stem.x, stem.v + dv, stem.p), q, z)
-    return (a - faster) / dv
+    farther = acceleration(valve, SLIP, sigma, Stem(stem.t, stem.x + dx, stem.v, stem.p), q, z)
+    kappa = (a - farther) / dx
+    own = valve.k_s * valve.per_m
+    return Linear(max((a - faster) / dv, 0.0), kappa if kappa > OTHER * own else own)
+
+
+def unlike(there: Linear, tried: Linear) -> bool:
+    """Whether what is linear there is worth another trial."""
+    damped = abs(there.damping - tried.damping) > OTHER * abs(tried.damping)
+    return damped or abs(there.kappa - tried.kappa) > OTHER * tried.kappa
+
+
+def shorter(shortest: float, there: Linear) -> float:
+    """Return the sub-step, s, from which one is exponential, with what is linear there."""
+    shortest = min(shortest, EXPONENTIAL_ANGLE / sqrt(there.kappa))
+    return min(shortest, DAMPED / there.damping) if there.damping > 0.0 else shortest
 
 
 def exponential_step(
     valve: Karnopp,
-    damping: float,
+    linear: Linear,
     sigma: float,
     drive: Drive,
     tau: float,
@@ -278,7 +307,7 @@ def exponential_step(
     z: Any,
 ) -> tuple[float, float, float, float]:
     """Slide over s from (x, v) with v' = a; return x, v, v' at its end and what the quadratic term changes of v."""
-    kappa = valve.k_s * valve.per_m
+    damping, kappa = linear
     g, slope = impulse(damping, kappa, 0.5 * s)
     half = response(damping, kappa, 0.5 * s, g, slope)
     # Twice the half is the whole.
@@ -360,8 +389,8 @@ def move(
     s = h - tau
     if v * v < NEGLIGIBLE * valve.v_s * valve.v_s and abs(a) * s > FIRST_CHANGE * (abs(v) + valve.v_s):
         s = max(FIRST_CHANGE * (abs(v) + valve.v_s) / abs(a), SHORTEST_SUBSTEP * s)
-    damping = valve.F_v * valve.per_m
-    shortest_exponential = EXPONENTIAL_ANGLE / sqrt(valve.k_s * valve.per_m)
+    linear = Linear(valve.F_v * valve.per_m, valve.k_s * valve.per_m)
+    shortest_exponential = EXPONENTIAL_ANGLE / sqrt(linear.kappa)
     tried = 0
     while tau < h:
         tried += 1
@@ -369,14 +398,14 @@ def move(
             return h, nan, nan, False
         exponential = mode == SLIP and s > shortest_exponential
         if exponential:
-            x1, v1, a1, error = exponential_step(valve, damping, sigma, drive, tau, s, x, v, a, q, z)
+            x1, v1, a1, error = exponential_step(valve, linear, sigma, drive, tau, s, x, v, a, q, z)
         else:
             x1, v1, a1, error = bogacki_shampine(valve, mode, sigma, drive, tau, s, x, v, a, q, z)
         allowed = tolerance * (abs(v1) + valve.v_s)
         if error > allowed and s > SHORTEST_SUBSTEP * h:
-            there = damping_at(valve, sigma, stem_at(drive, tau, x, v), a, q, z) if exponential else damping
-            if there > MORE * damping:
-                damping, shortest_exponential = there, min(shortest_exponential, DAMPED / there)
+            there = linear_at(valve, sigma, stem_at(drive, tau, x, v), a, q, z) if exponential else linear
+            if unlike(there, linear):
+                linear, shortest_exponential = there, shorter(shortest_exponential, there)
             else:
                 s *= 0.5
             continue

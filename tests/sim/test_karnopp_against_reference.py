@@ -127,21 +127,29 @@ def test_an_exponential_step_through_a_bent_force_is_checked() -> None:
     assert off_by_exponential_m(bent) < 5e-6
 
 
-def test_a_force_that_damps_the_stem_takes_as_few_sub_steps_as_viscous_friction(
-    monkeypatch: pytest.MonkeyPatch,
+@pytest.mark.parametrize(
+    ("viscous_ns_per_m", "force_ns_per_m", "mass_kg"),
+    [
+        pytest.param(2e3, 150e3, SEED.valve.mass_kg, id="damps"),
+        pytest.param(12e3, -10e3, 0.03, id="drives a light one"),
+    ],
+)
+def test_a_force_by_velocity_takes_as_few_sub_steps_as_viscous_friction(
+    monkeypatch: pytest.MonkeyPatch, viscous_ns_per_m: float, force_ns_per_m: float, mass_kg: float
 ) -> None:
-    """The automaton as it stands, without compiler: 150 kN s/m, for which the pair would take 10 us."""
+    """The automaton as it stands, without compiler: forces for which the pair would take 10 us."""
     asked = []
 
-    def damping(_F: float, stem: karnopp.Stem, _q: object, _z: object) -> float:
+    def velocity_force(_F: float, stem: karnopp.Stem, _q: object, _z: object) -> float:
         asked.append(stem)
-        return -150e3 * stem.v
+        return -force_ns_per_m * stem.v
 
-    valve = karnopp.karnopp(Composition.from_file(changed(viscous_ns_per_m=2e3)).theta)
+    file = changed(viscous_ns_per_m=viscous_ns_per_m, mass_kg=mass_kg)
+    valve = karnopp.karnopp(Composition.from_file(file).theta)
     begin = (0.05, 0.02, karnopp.SLIP, 1.0, 1e-5, False, None, None)
     drive = karnopp.Drive(0.0, 90e3, 0.0)
-    x, v, *_ = karnopp.step(valve._replace(F_v=152e3), drive, 0.01, *begin)
-    monkeypatch.setattr(karnopp, "force", damping)
+    x, v, *_ = karnopp.step(valve._replace(F_v=viscous_ns_per_m + force_ns_per_m), drive, 0.01, *begin)
+    monkeypatch.setattr(karnopp, "force", velocity_force)
     assert karnopp.step(valve, drive, 0.01, *begin) == pytest.approx((x, v, karnopp.SLIP, 1.0), rel=1e-5)
     assert len(asked) < 100
 
