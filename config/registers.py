@@ -75,7 +75,7 @@ class Register:
     def problem_with(self, value: float) -> str | None:
         """Return why the value may not be written, or None when it may."""
         if self.access == "r":
-            return f"{self.name} is read-only"
+            return f"{self.name}: is read-only"
         # Written so that NaN, for which no comparison holds, is outside.
         low = self.minimum is None or value >= self.minimum
         high = self.maximum is None or value <= self.maximum

@@ -91,6 +91,6 @@ def _line(readings: list["Reading"], took_s: float, position: str, wrong: str) -
         parts.append(f"pressure {last.pressure_pa:.1f} Pa")
     if last.device_time_s is not None:
         new = len({reading.device_time_s for reading in readings})
-        parts.append(f"{new} new of {len(readings)}")
+        parts.append(f"{new} of {len(readings)} samples new")
     parts.append(f"NOT plausible: {wrong}" if wrong else "plausible")
     return ", ".join(parts)

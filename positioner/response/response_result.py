@@ -68,7 +68,7 @@ class ResponseFigures(Result):
         if not self.steps:
             return ["no step", *notes]
         scale, unit = self._input_unit
-        noise = "" if self.noise_m is None else f", noise {1e3 * self.noise_m:.3g} mm"
+        noise = "" if self.noise_m is None else f", scatter at rest {1e3 * self.noise_m:.3g} mm"
         gain_unit = "m/m" if self.input == "reference_m" else "m/Pa"
         return [
             f"{len(self.steps)} steps of {self.input}{noise}",

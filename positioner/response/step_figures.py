@@ -131,7 +131,7 @@ def _measure_times(
 def _reason_untimed(time_s: Column, step: StepChange, before: RestLevel, after: RestLevel, noise: float) -> str | None:
     """Return why no time can be determined of a step whose stem moved; None when it can."""
     if noise * SMALLEST_SIGMA > 1:
-        return f"the move is {1 / noise:.0f} times the noise, determined from {SMALLEST_SIGMA:.0f} times up"
+        return f"the move is {1 / noise:.0f} times its rests' scatter, determined from {SMALLEST_SIGMA:.0f} times up"
     for rest, when in ((before, "at rest before the step"), (after, "settled before the hold ended")):
         allowed_m = max(6 * rest.level_std_m, DRIFT * abs(after.level_m - before.level_m))
         if abs(rest.drift_m) > allowed_m:

@@ -35,7 +35,7 @@ def test_a_reference_beyond_the_stroke_is_named() -> None:
     assert BY_NAME["reference"].problem_with(1.00000012) == "reference: allowed is 0 to 1 p.u., got 1.00000012"
     assert BY_NAME["mode"].problem_with(3.0) == "mode: allowed is 0 to 2, got 3"
     assert BY_NAME["reference"].problem_with(1.5) == "reference: allowed is 0 to 1 p.u., got 1.5"
-    assert BY_NAME["state"].problem_with(1) == "state is read-only"
+    assert BY_NAME["state"].problem_with(1) == "state: is read-only"
 
 
 def test_a_register_of_whole_numbers_refuses_others() -> None:

@@ -110,7 +110,7 @@ def test_a_move_that_drowns_in_noise_has_a_travel_and_no_times() -> None:
     assert close(step.travel_m, 0.01)
     assert step.t63_s.value is None
     assert step.t63_s.reason is not None
-    assert "times the noise" in step.t63_s.reason
+    assert "times its rests' scatter" in step.t63_s.reason
 
 
 @pytest.mark.parametrize("noise_m", [0.0, 1e-4])

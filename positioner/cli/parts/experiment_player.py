@@ -43,7 +43,9 @@ def require_ready(file: "DaemonFile", arguments: argparse.Namespace) -> None:
     """
 
     if file.recorder is None:
-        raise InputError(str(arguments.config), "recorder: is needed, for experiments are read from its recordings")
+        raise InputError(
+            str(arguments.config), 'recorder: is needed to read experiments: [recorder] folder = "recordings"'
+        )
     folder = recordings_of(file, arguments)
     with daemon_of(arguments) as dcs:
         if not folder.is_dir():
