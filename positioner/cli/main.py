@@ -12,7 +12,8 @@ import os
 import re
 import select
 import sys
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
+from functools import partial
 from math import isfinite, nan
 from typing import Any, NoReturn
 
@@ -131,6 +132,19 @@ class WithDefaults(argparse.HelpFormatter):
         return f"{text} ({' '.join(f'{each:g}' if isinstance(each, float) else str(each) for each in values)})"
 
 
+class Grouped(WithDefaults):
+    """Help whose list of commands has a heading before each group."""
+
+    def __init__(self, *what: Any, headings: Mapping[str, str], **named: Any) -> None:
+        super().__init__(*what, **named)
+        self._headings = headings
+
+    def _format_action(self, action: argparse.Action) -> str:
+        text = super()._format_action(action)
+        heading = self._headings.get(action.dest)
+        return text if heading is None else f"\n  {heading}:\n{text}"
+
+
 class OneLine(argparse.ArgumentParser):
     """A parser that says what is wrong in one line, as every command does, without its usage before it.
 
@@ -176,17 +190,18 @@ def command_parser(words: Sequence[str] = ()) -> argparse.ArgumentParser:
     """Return the parser of the command that the words begin with, or of all: what is parsed is imported."""
     from importlib.metadata import version
 
-    from positioner.cli.parts.command_finder import commands_for
+    from positioner.cli.parts.command_finder import commands_for, headings
 
+    found = commands_for(list(words))
     parser = OneLine(
         prog="positioner",
         description="Identifies and positions sticking pneumatic control valves over fieldbus.",
         epilog="Exit status: 0 done or yes, 1 no (each command says what), 2 bad input. "
         "In the help of a command, brackets after an option hold its default.",
+        formatter_class=partial(Grouped, headings=headings([each.name for each in found])),
     )
     parser.add_argument("--version", action="version", version=f"positioner {version('positioner')}")
     commands = parser.add_subparsers(dest="command", metavar="COMMAND", required=True)
-    found = commands_for(list(words))
     for each in found:
         if len(found) > 1 and each.lacks:
             commands.add_parser(each.name, help=each.lacks)

@@ -24,7 +24,7 @@ from config.recording import read_recording
 from config.recording_oddities import odd_settings
 from config.registers import REGISTERS
 from positioner.cli.main import command_parser, main
-from positioner.cli.parts.command_finder import all_commands
+from positioner.cli.parts.command_finder import BROUGHT, GROUPS, all_commands
 
 Capture = pytest.CaptureFixture[str]
 DAEMON = "[valve]\nstroke_m = 0.1016\n[device]\nport = {port}\n[supervisory]\nport = 0\n"
@@ -83,6 +83,8 @@ def test_help_names_every_command(capsys: Capture) -> None:
     with pytest.raises(SystemExit):
         main(["--help"])
     everything = capsys.readouterr().out
+    headings = [line.strip(" :") for line in everything.splitlines() if re.match(r"  \S.*:$", line)]
+    assert headings == [*GROUPS, BROUGHT]
     assert all(re.search(rf"^ +{name}\b", everything, re.MULTILINE) for name in all_commands())
 
 

@@ -19,48 +19,63 @@ from config.errors import InputError
 from config.extras import EXTRAS
 
 GROUP = "positioner.commands"
-COMMANDS = {
-    "demo": "sim,plot",
-    "sim": "sim,plot",
-    "run": "",
-    "probe": "",
-    "doctor": "",
-    "get": "",
-    "set": "",
-    "identify": "",
-    "commission": "",
-    "signature": "",
-    "pst": "",
-    "cst": "",
-    "steps": "",
-    "report": "",
-    "discriminate": "sim,plot",
-    "map": "",
-    "health": "",
-    "alarms": "",
-    "events": "",
-    "import": "",
-    "valve": "",
-    "simulate": "sim,plot",
-    "export": "sim,plot",
-    "play": "sim,plot",
-    "estimate": "",
-    "response": "",
-    "compare": "sim,plot",
-    "diagnose": "sim,plot",
-    "discover": "sim,plot",
-    "extend": "sim,plot",
-    "fleet": "fleet",
-    "loop": "sim,plot",
-    "loops": "sim,plot",
-    "bench": "sim,plot",
-    "hide": "sim,plot",
-    "reproduce": "sim,plot",
-    "certify": "",
-    "certificates": "tls",
-    "completion": "completion",
+GROUPS: dict[str, dict[str, str]] = {
+    "to begin": {
+        "demo": "sim,plot",
+        "completion": "completion",
+    },
+    "a valve under control": {
+        "sim": "sim,plot",
+        "run": "",
+        "probe": "",
+        "doctor": "",
+        "get": "",
+        "set": "",
+        "identify": "",
+        "certify": "",
+        "certificates": "tls",
+    },
+    "tests and experiments, most of which move the valve": {
+        "commission": "",
+        "signature": "",
+        "pst": "",
+        "cst": "",
+        "steps": "",
+        "report": "",
+        "discriminate": "sim,plot",
+    },
+    "what a running valve shows": {
+        "map": "",
+        "health": "",
+        "alarms": "",
+        "events": "",
+    },
+    "a recording and a model": {
+        "import": "",
+        "valve": "",
+        "simulate": "sim,plot",
+        "export": "sim,plot",
+        "play": "sim,plot",
+        "estimate": "",
+        "response": "",
+        "compare": "sim,plot",
+        "diagnose": "sim,plot",
+        "discover": "sim,plot",
+        "extend": "sim,plot",
+        "hide": "sim,plot",
+    },
+    "many valves, control loops, benchmarks": {
+        "fleet": "fleet",
+        "loop": "sim,plot",
+        "loops": "sim,plot",
+        "bench": "sim,plot",
+        "reproduce": "sim,plot",
+    },
 }
-"""The roof's own, in the order of `positioner --help`, each with the extras that it needs."""
+"""The roof's own, as `positioner --help` groups them, each with the extras that it needs."""
+BROUGHT = "pages, servers, and what other packages bring"
+"""Heading of the commands that come by entry points."""
+COMMANDS = {name: extra for group in GROUPS.values() for name, extra in group.items()}
 MODULES = {"import": "import_recording", "valve": "valve_from_data_sheet"}
 """Files of commands whose name is taken: by the language, by another file."""
 
@@ -116,3 +131,10 @@ def commands_for(words: list[str]) -> list[Command]:
     if first in every:
         return [every[first]]
     return [every[name] for name in (*COMMANDS, *(each for each in sorted(every) if each not in COMMANDS))]
+
+
+def headings(names: list[str]) -> dict[str, str]:
+    """Return the heading that stands before a command in a list of all, by the command's name."""
+    first = {next(iter(group)): heading for heading, group in GROUPS.items()}
+    brought = next((name for name in names if name not in COMMANDS), None)
+    return first if brought is None else {**first, brought: BROUGHT}
