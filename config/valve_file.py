@@ -4,7 +4,7 @@
     at rest it stays until |A u - k_s x| > F_s
 
 The same file drives the simulated slave, the offline simulation and the workbench. In place of `[valve]` there may be a
-table `[drive]`, with the names and units of its kind (`config.drive`).
+table `[drive]`, with the names and units of its kind (`config.drive`). `config.data_sheet` makes one of a data sheet.
 """
 
 import re

@@ -6,7 +6,8 @@
 canopen makes and reads the frames; they are sent and awaited here, in the calling thread. An answer that names another
 object than the request, or is of another kind, is not taken for its answer: other masters ask the node, too. Nodes that
 share a node id show by answers beyond the requests; so that a slow node's answers to an earlier session are not
-counted, `open` lets them go by first.
+counted, `open` lets them go by first. Then it compares vendor and product with the data sheet: a node of another
+identity is refused by name.
 """
 
 import math

@@ -5,7 +5,8 @@
 
 Neither mass nor viscous friction, lag nor sampling stands in it, and a preload F_0 is no error but a parameter.
 
-    stem_at_rest, landing_detector    does the stem rest, and where; which rests are landings, sample by sample
+    stem_at_rest                      does the stem rest, and where; how far short a slow pressure may leave it
+    landing_detector                  which rests are landings, sample by sample
     seen_time                         the time for which the stem was seen: an outage is learnt from by nobody
     pressure_delivered                is the pressure measured at a rest the one commanded
     static_law, local_balance         κ, φ_up, φ_down with their deviations; the pressure that lands at a position
