@@ -27,6 +27,7 @@ import numpy as np
 
 from benchmarks.blind import KEPT
 from benchmarks.kept_lines import Line, keep, kept
+from config.experiment_limits import ExperimentLimits
 from config.recording import Recording
 from config.slave_file import Sensor
 from sim.composition import Composition
@@ -44,7 +45,7 @@ from workbench.discriminate.discrimination import (
     by_design,
     discriminate,
 )
-from workbench.discriminate.experiment_design import Bounds, DesignedExperiment, Terms, courses
+from workbench.discriminate.experiment_design import DesignedExperiment, Terms, courses
 from workbench.discriminate.rival_odds import RivalOdds
 from workbench.fit.fit_result import Fit
 from workbench.fit.fitting import fit
@@ -113,7 +114,7 @@ def line(case: Line, how: Sequence[str], workers: int, *, pressure: bool) -> Lin
     rivals = not_contradicted(rivals, made)
     commands_pa = ready(whole).command_pa
     stroke_m = made.base.valve.stroke_m
-    bounds = Bounds(
+    bounds = ExperimentLimits(
         float(commands_pa.min()), float(commands_pa.max()), RATE_PA_PER_S, LONGEST_S, -0.1 * stroke_m, 1.1 * stroke_m
     )
     found = {

@@ -79,36 +79,20 @@ def _tls(device: Device, clock: Clock, spoiler: Spoiler, stack: ExitStack) -> tu
     server = RegisterServer(DeviceRegisters(device, clock), "127.0.0.1", 0, 1, guard)
     server.start()
     stack.callback(server.stop)
-    port = stack.enter_context(_spoilt_records(server.port, spoiler))
+    port = stack.enter_context(spoilt_wire(server.port, spoiler, _carry_secured))
     secured = tls("daemon", handshake_timeout_s=HANDSHAKE_TIMEOUT_S)
     return ModbusTcpDevice(port=port, reply_timeout_s=REPLY_TIMEOUT_S, tls=secured), Side(device)
 
 
-@contextmanager
-def _spoilt_records(port: int, spoiler: Spoiler) -> Iterator[int]:
-    """Carry TLS records between the port given and whoever connects; say on which port."""
-    listener = socket.create_server(("127.0.0.1", 0))
-    Thread(target=_accept_secured, args=(listener, port, spoiler), daemon=True).start()
-    try:
-        yield listener.getsockname()[1]
-    finally:
-        listener.shutdown(socket.SHUT_RDWR)
-        listener.close()
-
-
-def _accept_secured(listener: socket.socket, port: int, spoiler: Spoiler) -> None:
-    while True:
-        try:
-            near, _ = listener.accept()
-        except OSError:
-            return
-        far = socket.create_connection(("127.0.0.1", port))
-        spoiler.forget()
-        for each in (near, far):
-            each.setsockopt(socket.IPPROTO_TCP, socket.TCP_NODELAY, 1)
-        requests = partial(_carry_records, near, far, lambda record: [] if spoiler.takes_request() else [record])
-        Thread(target=requests, daemon=True).start()
-        Thread(target=partial(_carry_records, far, near, spoiler.replies), daemon=True).start()
+def _carry_secured(near: socket.socket, port: int, spoiler: Spoiler) -> None:
+    """Carry TLS records between a connection and a port."""
+    far = socket.create_connection(("127.0.0.1", port))
+    spoiler.forget()
+    for each in (near, far):
+        each.setsockopt(socket.IPPROTO_TCP, socket.TCP_NODELAY, 1)
+    requests = partial(_carry_records, near, far, lambda record: [] if spoiler.takes_request() else [record])
+    Thread(target=requests, daemon=True).start()
+    _carry_records(far, near, spoiler.replies)
 
 
 def _carry_records(near: socket.socket, far: socket.socket, spoilt: Callable[[bytes], Sequence[bytes]]) -> None:

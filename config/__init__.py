@@ -22,6 +22,7 @@ Its files:
     extras                                        which extra brings what is not installed
     quantities, quantity_map, modbus_map          what a device measures and obeys; where it keeps it; in registers
     register_format                               values in words
+    experiment_limits                             what an experiment must stay inside
     registers, codes, roles                       every register and who may write it; every code; the roles
     passwords, role_passwords                     passwords as they are kept, how often one is tried; of the roles
     recording, recording_oddities                 the recording format; what is odd about a recording

@@ -1,6 +1,7 @@
 """`positioner discriminate`: where a diagnosis ends `one_of`, experiments on the running valve tell rivals apart."""
 
 import argparse
+from dataclasses import replace
 from itertools import count
 from pathlib import Path
 from typing import TYPE_CHECKING
@@ -18,8 +19,9 @@ from positioner.cli.parts.progress import Progress
 
 if TYPE_CHECKING:
     from config.daemon_file import DaemonFile
+    from config.experiment_limits import ExperimentLimits
     from workbench.discriminate.discrimination import Played, Player, Round
-    from workbench.discriminate.experiment_design import Bounds, DesignedExperiment
+    from workbench.discriminate.experiment_design import DesignedExperiment
 
 HELP = "diagnose, then play experiments until one of several equally good effects is left (moves the valve)"
 EXAMPLE = "positioner discriminate site.toml --rec rec.csv --valve better.toml --out experiments"
@@ -99,14 +101,13 @@ def run(arguments: argparse.Namespace) -> int:
     return 0 if told.outcome in ("resolved", "one_class") else 1
 
 
-def _bounds(file: "DaemonFile", config: Path) -> "Bounds":
+def _bounds(file: "DaemonFile", config: Path) -> "ExperimentLimits":
     """Return what designs must stay inside: the daemon's permissives, and room for the approach.
 
     Raises:
         InputError: no room is left.
     """
     from positioner.control.settings import Settings
-    from workbench.discriminate.experiment_design import Bounds
 
     limits = Settings.of(file).experiment
     approach_s = (limits.maximum_pa - limits.minimum_pa) / limits.rate_pa_per_s
@@ -117,10 +118,8 @@ def _bounds(file: "DaemonFile", config: Path) -> "Bounds":
             f"experiment.limit_s must exceed {3.0 * approach_s:.3g} s, three times the way through the pressures at "
             f"rate_limit_pa_per_s, got {limits.longest_s:g} s",
         )
-    return Bounds(
-        minimum_pa=limits.minimum_pa,
-        maximum_pa=limits.maximum_pa,
-        rate_pa_per_s=limits.rate_pa_per_s,
+    return replace(
+        limits,
         longest_s=limits.longest_s - approach_s,
         low_m=limits.low_m + margin_m,
         high_m=limits.high_m - margin_m,

@@ -21,6 +21,7 @@ from itertools import pairwise
 from statistics import median
 
 from config.codes import ExperimentState, Fault, Mode
+from config.experiment_limits import ExperimentLimits
 from positioner.control.permissives import missing
 from positioner.control.requests import ExperimentRequest
 
@@ -29,18 +30,6 @@ COUNTED = 5
 COMMANDING = (ExperimentState.UNDER_WAY, ExperimentState.RETURNING)
 ROUNDING = 1e-3
 """Of the rate and the length: times and pressures come as float32."""
-
-
-@dataclass(frozen=True, slots=True)
-class ExperimentLimits:
-    """What an experiment must stay inside: Pa, Pa/s, s for the approach and the sequence, m."""
-
-    minimum_pa: float
-    maximum_pa: float
-    rate_pa_per_s: float
-    longest_s: float
-    low_m: float
-    high_m: float
 
 
 @dataclass(frozen=True, slots=True)

@@ -6,12 +6,12 @@ from math import inf, sqrt
 
 from config.codes import Fault, Sampling
 from config.daemon_file import DaemonFile, LawTable
+from config.experiment_limits import ExperimentLimits
 from config.extended_valve import ExtendedValve
 from config.supervision_table import FaultActionName
 from positioner.control.laws.boundary import LawSettings, law_named
 from positioner.control.monitors import MonitorSettings
 from positioner.control.permissives import ExcitationLimits
-from positioner.control.played_experiment import ExperimentLimits
 from positioner.control.staircase_excitation import StaircaseLimits
 from positioner.control.supervision import Limits
 from positioner.control.travel.cutoffs import Cutoffs

@@ -10,7 +10,7 @@ import json
 import socket
 import struct
 import sys
-from collections.abc import Iterator
+from collections.abc import Callable, Iterator
 from contextlib import contextmanager, suppress
 from threading import Thread
 
@@ -19,11 +19,21 @@ from positioner.testing.wire_faults import WIRE_FAULTS, Spoiler
 HEADER = struct.Struct(">HHHB")
 
 
+Carry = Callable[[socket.socket, int, Spoiler], None]
+"""What carries between a connection and a port of this machine, until one of them ends."""
+
+
 @contextmanager
-def spoilt_wire(port: int, spoiler: Spoiler) -> Iterator[int]:
-    """Carry frames between the port given, on this machine, and whoever connects; say on which port."""
+def spoilt_wire(port: int, spoiler: Spoiler, carry: Carry | None = None) -> Iterator[int]:
+    """Carry between the port given, on this machine, and whoever connects; say on which port.
+
+    Args:
+        port: of the device.
+        spoiler: says what is spoilt.
+        carry: by what; None: by frames of Modbus TCP.
+    """
     listener = socket.create_server(("127.0.0.1", 0))
-    Thread(target=_accept, args=(listener, port, spoiler), daemon=True).start()
+    Thread(target=_accept, args=(listener, port, spoiler, carry or _carry), daemon=True).start()
     try:
         yield listener.getsockname()[1]
     finally:
@@ -31,13 +41,13 @@ def spoilt_wire(port: int, spoiler: Spoiler) -> Iterator[int]:
         listener.close()
 
 
-def _accept(listener: socket.socket, port: int, spoiler: Spoiler) -> None:
+def _accept(listener: socket.socket, port: int, spoiler: Spoiler, carry: Carry) -> None:
     while True:
         try:
             near, _ = listener.accept()
         except OSError:
             return
-        Thread(target=_carry, args=(near, port, spoiler), daemon=True).start()
+        Thread(target=carry, args=(near, port, spoiler), daemon=True).start()
 
 
 def _carry(near: socket.socket, port: int, spoiler: Spoiler) -> None:

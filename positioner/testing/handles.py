@@ -14,6 +14,8 @@ AGENT, PROXY = "positioner.testing.agent", "positioner.testing.fault_proxy"
 COMMANDS = ("positioner.testing.tied", "positioner.cli")
 HOST = "127.0.0.1"
 HANDLE_POLL_S = 0.02
+LOST = 2.0
+"""As `config.codes.Quality.LOST`, which is not loaded in somebody else's process."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -166,17 +168,20 @@ def slave_running(folder: Path, stroke_m: float, lockstep: bool) -> Iterator[Val
 
 @contextmanager
 def daemon_running(folder: Path) -> Iterator[PositionerDaemon]:
-    """Run the daemon of `daemon.toml` in a folder.
+    """Run the daemon of `daemon.toml` in a folder; give it when it has measured, for silence before that is no fault.
 
     Raises:
         NotStarted: it ended instead.
+        AssertionError: it has not measured within a minute.
     """
     with ExitStack() as stack:
         daemon = stack.enter_context(launch(*COMMANDS, "run", str(folder / "daemon.toml"), log=folder / "daemon.log"))
         port = port_in(daemon.ready)
         agent = Agent(AGENT, "daemon", str(port), log=folder / "daemon_agent.log")
         stack.callback(agent.end)
-        yield PositionerDaemon(HOST, port, folder, daemon, agent)
+        handle = PositionerDaemon(HOST, port, folder, daemon, agent)
+        handle.until("quality", lambda quality: quality != LOST)
+        yield handle
 
 
 @contextmanager

@@ -23,13 +23,14 @@ import numpy as np
 
 from config.codes import ValveTestVerdict
 from config.drive import Kind, as_written
+from config.experiment_limits import ExperimentLimits
 from config.recording import Column, Recording
 from config.travel import ActionWord
 from positioner.response.figure import Figure, no_value
 from positioner.tests_on_the_valve import signature, small_steps
 from positioner.tests_on_the_valve.air_rates import air_rates, supply_lacking, verdict_at_rest
 from positioner.tests_on_the_valve.outcome import Outcome, Quantity, digits
-from positioner.tests_on_the_valve.program import Bounds, Leap, Player, Program, ramped
+from positioner.tests_on_the_valve.program import Leap, Player, Program, ramped
 from positioner.tests_on_the_valve.ramps import difference, rate_of, scaled
 from positioner.tests_on_the_valve.valve_test_thresholds import THRESHOLDS
 from signals.noise import quantum_m
@@ -87,7 +88,7 @@ class _Ended(Exception):
 
 
 def commission(
-    valve: Watching, name: str, bounds: Bounds, show: Callable[[str], None] = lambda _: None
+    valve: Watching, name: str, bounds: ExperimentLimits, show: Callable[[str], None] = lambda _: None
 ) -> Commissioned:
     """Commission a valve.
 
@@ -103,7 +104,7 @@ def commission(
         return Commissioned(Outcome(TEST, name, (), (ended.verdict,), (ended.why,)))
 
 
-def _commissioned(valve: Watching, name: str, bounds: Bounds, show: Callable[[str], None]) -> Commissioned:
+def _commissioned(valve: Watching, name: str, bounds: ExperimentLimits, show: Callable[[str], None]) -> Commissioned:
     show("watching")
     noise_m, digit_m, creep = _watched(valve.watch(THRESHOLDS.watched_s))
     start_pa = valve.command_pa()
@@ -199,7 +200,9 @@ def _played(valve: Watching, program: Program, show: Callable[[str], None]) -> R
     return played.recording
 
 
-def _direction(valve: Watching, bounds: Bounds, start_pa: float, moved_m: float, show: Callable[[str], None]) -> float:
+def _direction(
+    valve: Watching, bounds: ExperimentLimits, start_pa: float, moved_m: float, show: Callable[[str], None]
+) -> float:
     """Return whether the reading rises, 1, or falls, -1, with the command."""
     rate = (bounds.maximum_pa - bounds.minimum_pa) / THRESHOLDS.creep_s
     first = 1.0 if start_pa < 0.5 * (bounds.minimum_pa + bounds.maximum_pa) else -1.0
@@ -216,7 +219,7 @@ def _direction(valve: Watching, bounds: Bounds, start_pa: float, moved_m: float,
 
 
 def _ramps(
-    valve: Watching, bounds: Bounds, start_pa: float, sign: float, show: Callable[[str], None]
+    valve: Watching, bounds: ExperimentLimits, start_pa: float, sign: float, show: Callable[[str], None]
 ) -> list[Recording]:
     slow, _, fast = signature.programmes(bounds, start_pa)
     return [_mirrored(_played(valve, each, show), sign) for each in (slow, fast)]
@@ -227,7 +230,7 @@ def _mirrored(recording: Recording, sign: float) -> Recording:
     return Recording(dict(recording.columns) | {"position_m": sign * recording.position_m}, recording.metadata)
 
 
-def _strokes(bounds: Bounds, start_pa: float) -> Program:
+def _strokes(bounds: ExperimentLimits, start_pa: float) -> Program:
     low, high = bounds.minimum_pa, bounds.maximum_pa
     held_s = THRESHOLDS.stroke_held_s
     leaps = (Leap(low, held_s), Leap(high, held_s), Leap(low, held_s), Leap(start_pa, 0.5))
@@ -272,7 +275,7 @@ def _leak(recording: Recording, sign: float, digit_m: float) -> Figure:
 
 def _steps(
     valve: Watching,
-    bounds: Bounds,
+    bounds: ExperimentLimits,
     start_pa: float,
     half_pa: float,
     friction: Figure,
@@ -302,7 +305,7 @@ def of_one_that_sticks(friction: Figure, dead_band: Figure) -> Figure:
     return replace(friction, plus_minus=hypot(friction.plus_minus or 0.0, open_pa))
 
 
-def _supply(found: Outcome, bounds: Bounds) -> Figure:
+def _supply(found: Outcome, bounds: ExperimentLimits) -> Figure:
     """Return the commands above what takes the stem to its upper end, over the bench set's span."""
     low, high, friction = (found.figure(each) for each in ("bench_low_pa", "bench_high_pa", "friction_pa"))
     span = difference(high, low)
@@ -312,7 +315,7 @@ def _supply(found: Outcome, bounds: Bounds) -> Figure:
     return scaled(difference(Figure(bounds.maximum_pa, 0.0), needed), 1.0 / span.value)
 
 
-def _proposals(outcome: Outcome, action: ActionWord, bounds: Bounds) -> list[Proposal]:
+def _proposals(outcome: Outcome, action: ActionWord, bounds: ExperimentLimits) -> list[Proposal]:
     travel, slope, friction = (outcome.figure(each) for each in ("travel_m", "spring_pa_per_m", "friction_pa"))
     low, high = (outcome.figure(each) for each in ("bench_low_pa", "bench_high_pa"))
     opens = action == "air_to_open"

@@ -15,10 +15,11 @@ from dataclasses import dataclass
 from config.codes import ValveTestVerdict
 from config.drive import VALVE, Kind
 from config.errors import InputError
+from config.experiment_limits import ExperimentLimits
 from positioner.response.figure import Figure, no_value
 from positioner.tests_on_the_valve.breakout import Breakout, breakout, rest_before, tolerance_m
 from positioner.tests_on_the_valve.outcome import Curve, Outcome, Picture, Quantity
-from positioner.tests_on_the_valve.program import Bounds, Leap, Played, Program, ramped, require_within
+from positioner.tests_on_the_valve.program import Leap, Played, Program, ramped, require_within
 from positioner.tests_on_the_valve.valve_test_thresholds import THRESHOLDS
 
 TEST = "continuous stroke test"
@@ -45,7 +46,7 @@ class ContinuousStroke:
 
 def programme(
     asked: ContinuousStroke,
-    bounds: Bounds,
+    bounds: ExperimentLimits,
     start_pa: float,
     stroke_m: float,
     way: int,

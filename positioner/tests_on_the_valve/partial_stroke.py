@@ -23,6 +23,7 @@ import numpy as np
 
 from config.codes import ExperimentState, ValveTestVerdict
 from config.errors import InputError
+from config.experiment_limits import ExperimentLimits
 from config.recording import Recording
 from positioner.response.figure import Figure, no_value
 from positioner.tests_on_the_valve.air_rates import verdict_at_rest
@@ -36,7 +37,7 @@ from positioner.tests_on_the_valve.breakout import (
     tolerance_m,
 )
 from positioner.tests_on_the_valve.outcome import Curve, Outcome, Picture, Quantity
-from positioner.tests_on_the_valve.program import SHORTEST_S, Bounds, Leap, Played, Program, ramped, require_within
+from positioner.tests_on_the_valve.program import SHORTEST_S, Leap, Played, Program, ramped, require_within
 from positioner.tests_on_the_valve.ramps import difference, legs_of, ramps_of
 from positioner.tests_on_the_valve.valve_test_thresholds import THRESHOLDS
 
@@ -80,7 +81,7 @@ class PartialStroke:
 
 def programme(
     asked: PartialStroke,
-    bounds: Bounds,
+    bounds: ExperimentLimits,
     start_pa: float,
     stem_m: float,
     stroke_m: float,

@@ -11,9 +11,7 @@ from typing import Protocol
 from config.codes import ExperimentState, ValveTestVerdict
 from config.errors import InputError
 from config.recording import Recording
-from positioner.control.played_experiment import ExperimentLimits
 
-Bounds = ExperimentLimits
 """What every program must stay inside: those of the experiments."""
 SHORTEST_S = 1e-3
 """Between two points, which must follow each other."""

@@ -28,12 +28,13 @@ from config.actuators import NEEDED
 from config.codes import ValveTestVerdict
 from config.drive import VALVE, Kind
 from config.errors import InputError
+from config.experiment_limits import ExperimentLimits
 from config.recording import Column, Recording
 from config.results.block import Table
 from positioner.response.figure import Figure, no_value
 from positioner.tests_on_the_valve.air_rates import supply_lacking, verdict_at_rest
 from positioner.tests_on_the_valve.outcome import Curve, Outcome, Picture, Quantity
-from positioner.tests_on_the_valve.program import Bounds, Leap, Program, ramped
+from positioner.tests_on_the_valve.program import Leap, Program, ramped
 from positioner.tests_on_the_valve.ramps import Leg, Line, Ramps, difference, legs_of, ramps_of, scaled
 from positioner.tests_on_the_valve.valve_test_thresholds import THRESHOLDS
 
@@ -57,7 +58,7 @@ class Nameplate:
     kind: Kind = VALVE
 
 
-def programmes(bounds: Bounds, start_pa: float, source: str = "experiment") -> tuple[Program, ...]:
+def programmes(bounds: ExperimentLimits, start_pa: float, source: str = "experiment") -> tuple[Program, ...]:
     """Return the slow ramps, twice, and the fast ones, each a program of its own, as slow as the time limit permits.
 
     From the command in force to the nearer end of the pressures, to the other, there again, and back; the fast ones go

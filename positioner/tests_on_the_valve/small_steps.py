@@ -14,12 +14,13 @@ from statistics import median
 
 from config.codes import ValveTestVerdict
 from config.errors import InputError
+from config.experiment_limits import ExperimentLimits
 from config.recording import Column, Recording
 from positioner.response.figure import Figure, no_value
 from positioner.response.measured_dead_band import follows_step
 from positioner.response.response_figures import respond
 from positioner.tests_on_the_valve.outcome import Curve, Outcome, Picture, Quantity
-from positioner.tests_on_the_valve.program import Bounds, Leap, Program, ramped, require_within
+from positioner.tests_on_the_valve.program import Leap, Program, ramped, require_within
 from positioner.tests_on_the_valve.ramps import scaled
 from positioner.tests_on_the_valve.valve_test_thresholds import THRESHOLDS
 
@@ -46,7 +47,7 @@ class SmallSteps:
 
 
 def programme(
-    asked: SmallSteps, bounds: Bounds, start_pa: float, stroke_m: float, source: str = "experiment"
+    asked: SmallSteps, bounds: ExperimentLimits, start_pa: float, stroke_m: float, source: str = "experiment"
 ) -> Program:
     """Return the program: up first, or down where there is no room above.
 

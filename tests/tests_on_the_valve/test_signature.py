@@ -8,6 +8,7 @@ import pytest
 
 from config.codes import ValveTestVerdict
 from config.errors import InputError
+from config.experiment_limits import ExperimentLimits
 from config.recording import Recording
 from config.valve_file import EffectTable, ValveFile
 from positioner.cli.main import main
@@ -15,7 +16,6 @@ from positioner.control.settings import Settings
 from positioner.tests_on_the_valve.kept_records import baseline, changes, keep, records
 from positioner.tests_on_the_valve.outcome import Outcome
 from positioner.tests_on_the_valve.own_cycle import OwnCycle
-from positioner.tests_on_the_valve.program import Bounds
 from positioner.tests_on_the_valve.signature import Nameplate, programmes, signature
 from tests.control import pneumatic_valve as other
 from tests.simulated import simulated
@@ -34,7 +34,7 @@ from tests.tests_on_the_valve.virtual_valve import (
     told,
 )
 
-BOUNDS = Bounds(0.0, MAXIMUM_PA, 100e3, 300.0, -1.0, 1.0)
+BOUNDS = ExperimentLimits(0.0, MAXIMUM_PA, 100e3, 300.0, -1.0, 1.0)
 PLATE = Nameplate("FV-1", STROKE_M, AREA_M2)
 NOISE = 0.01
 """Of the span."""
@@ -49,7 +49,9 @@ def lagging(file: ValveFile, time_constant_s: float) -> ValveFile:
     return file.model_copy(update={"effect": (*file.effect, lag)})
 
 
-def recorded(file: ValveFile, *, seed: int = 0, noise: float = NOISE, bounds: Bounds = BOUNDS) -> list[Recording]:
+def recorded(
+    file: ValveFile, *, seed: int = 0, noise: float = NOISE, bounds: ExperimentLimits = BOUNDS
+) -> list[Recording]:
     """Return what a valve does under the programmes, open loop, from no pressure."""
     recordings = []
     for number, program in enumerate(programmes(bounds, 0.0)):

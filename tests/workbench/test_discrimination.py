@@ -11,6 +11,7 @@ from typing import Literal
 import numpy as np
 import pytest
 
+from config.experiment_limits import ExperimentLimits
 from config.recording import Recording
 from config.valve_file import EffectTable, ValveFile
 from positioner.cli.main import main
@@ -23,7 +24,6 @@ from workbench.discriminate import rival_odds
 from workbench.discriminate.discrimination import SURE, Discrimination, Played, Player, Round, discriminate
 from workbench.discriminate.experiment_design import (
     MOST_MOVES,
-    Bounds,
     Course,
     DesignedExperiment,
     Leg,
@@ -40,7 +40,7 @@ BARE = drawn_valve(np.random.default_rng(11))
 LAGGING = with_effect(BARE, "ip_lag", time_constant_s=0.06)
 RIVALS = ("ip_lag", "dead_time")
 PERIOD_S = 0.01
-BOUNDS = Bounds(0.0, 90e3, 400e3, 12.0, -1.0, 1.0)
+BOUNDS = ExperimentLimits(0.0, 90e3, 400e3, 12.0, -1.0, 1.0)
 COURSE = Course("by hand", 10e3, (Leg(60e3, 0.1, 2.0), Leg(15e3, 0.1, 2.0)))
 
 

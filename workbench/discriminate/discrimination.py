@@ -18,6 +18,7 @@ from typing import TYPE_CHECKING, Any, Literal
 
 import numpy as np
 
+from config.experiment_limits import ExperimentLimits
 from config.recording import Recording
 from config.results.block import Block, Table
 from config.results.result import Result
@@ -26,7 +27,6 @@ from workbench.diagnosis.diagnosis import Diagnosis
 from workbench.discriminate.experiment_design import (
     IMITATED,
     MOST_MOVES,
-    Bounds,
     DesignedExperiment,
     Terms,
 )
@@ -194,7 +194,7 @@ def discriminate(
     fits: Mapping[str, Fit],
     recordings: Sequence[Recording],
     player: Player,
-    bounds: Bounds,
+    bounds: ExperimentLimits,
     library: Mapping[str, Effect],
     *,
     budget: int = BUDGET,

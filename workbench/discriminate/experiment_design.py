@@ -30,6 +30,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from config.errors import InputError
+from config.experiment_limits import ExperimentLimits
 from config.recording import Recording
 from config.results.result import Brief
 from sim.composition import AREA, SPRING, Composition
@@ -61,22 +62,10 @@ SHORTEST_LEG_S = 0.05
 
 
 @dataclass(frozen=True, slots=True)
-class Bounds:
-    """What an experiment must stay inside: Pa, Pa/s, s, and m of stem travel."""
-
-    minimum_pa: float
-    maximum_pa: float
-    rate_pa_per_s: float
-    longest_s: float
-    low_m: float
-    high_m: float
-
-
-@dataclass(frozen=True, slots=True)
 class Terms:
     """On which the next experiment is chosen: its bounds, its moves, inputs that are not asked."""
 
-    bounds: Bounds
+    bounds: ExperimentLimits
     most_moves: int = MOST_MOVES
     seed: int = 0
     """Of the changes tried, and of the noise under which rivals answer."""
@@ -128,7 +117,7 @@ class Course(Brief):
         time_s = np.asarray(period_s * np.arange(max(2, round(self.duration_s / period_s))), dtype=np.float64)
         return time_s, np.asarray(np.interp(time_s, at_s, levels_pa), dtype=np.float64)
 
-    def within(self, bounds: Bounds) -> "Course":
+    def within(self, bounds: ExperimentLimits) -> "Course":
         """Return it with its levels inside the pressures, its ramps no faster than the rate, no longer than allowed.
 
         Raises:
@@ -220,7 +209,11 @@ def tells_apart(rated: NDArray[np.float64], least: float) -> NDArray[np.bool_]:
 
 
 def improve_course(
-    score: Callable[[Course], float], course: Course, most: float, bounds: Bounds, generator: np.random.Generator
+    score: Callable[[Course], float],
+    course: Course,
+    most: float,
+    bounds: ExperimentLimits,
+    generator: np.random.Generator,
 ) -> Course:
     """Return a course changed at random, a change kept if it scores more than all before; `most`: as it is."""
     for _ in range(TRIED_CHANGES):
@@ -231,7 +224,7 @@ def improve_course(
     return course
 
 
-def _change_inside(course: Course, bounds: Bounds, generator: np.random.Generator) -> Course:
+def _change_inside(course: Course, bounds: ExperimentLimits, generator: np.random.Generator) -> Course:
     """Return a course with one leg changed, or all lengths, or its first level; as it is where that takes too long."""
     try:
         return _change_course(course, bounds.maximum_pa - bounds.minimum_pa, generator).within(bounds)

@@ -20,8 +20,8 @@ from positioner.cli.parts.output_files import write_json
 
 if TYPE_CHECKING:
     from config.daemon_file import DaemonFile
+    from config.experiment_limits import ExperimentLimits
     from config.recording import Recording
-    from positioner.control.played_experiment import ExperimentLimits
     from positioner.tests_on_the_valve.kept_records import Record
     from positioner.tests_on_the_valve.outcome import Outcome
     from positioner.tests_on_the_valve.program import Played, Player, Program
