@@ -61,6 +61,7 @@ PAPER_STEPS = (0.65, 0.40, 0.80, 0.50, 0.40)
 SLIDES_STEPS = (0.65, 0.40)  # p.u.; both ways by the law of slides
 SMALL_STEPS = (0.41, 0.405, 0.43)
 """All below the 5.3 % of stroke from which on the paper's law moves this stem; after the last of `PAPER_STEPS`."""
+BAR_CELLS = 20  # characters of the bar that shows the stem
 PAPER_STEP_S = 0.5
 SLIDES_STEP_S = 1.5
 """Slides leave small errors alone while references change within 1.2 s of each other."""
@@ -442,13 +443,13 @@ def format_step(label: str, now: dict[str, float]) -> str:
     return f"{label:34} {_bar(now)} S{now['state']:.0f} {now['command'] / 1e3:5.1f} kPa"
 
 
-def _bar(now: dict[str, float], width: int = 20) -> str:
+def _bar(now: dict[str, float]) -> str:
     """Draw stem (#) and reference (|) over the travel; a stem that nobody measures is none."""
     position, reference = now["position"], now["reference_in_force"]
-    stem = round(min(max(position, 0.0), 1.0) * width) if math.isfinite(position) else 0
-    cells = ["#"] * stem + ["."] * (width - stem)
+    stem = round(min(max(position, 0.0), 1.0) * BAR_CELLS) if math.isfinite(position) else 0
+    cells = ["#"] * stem + ["."] * (BAR_CELLS - stem)
     if math.isfinite(reference):
-        cells[min(round(reference * width), width - 1)] = "|"
+        cells[min(round(reference * BAR_CELLS), BAR_CELLS - 1)] = "|"
     return f"[{''.join(cells)}] {position:z.3f}"
 
 

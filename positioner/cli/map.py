@@ -54,8 +54,14 @@ def run(arguments: argparse.Namespace) -> int:
 
         print(eds_text(), end="")
         return 0
-    rows = _reasons() if arguments.reasons else _map()
-    {"md": _markdown, "csv": _csv, "json": _json}[arguments.format](rows)
+    if arguments.reasons:
+        rows = [{"number": int(each), "name": each.name.lower(), "text": each.text} for each in Refusal]
+    else:
+        rows = [_row(register) for register in sorted(REGISTERS, key=lambda register: register.address)]
+    if arguments.format == "json":
+        print(json.dumps(rows, indent=1))
+    else:
+        {"md": _markdown, "csv": _csv}[arguments.format](rows)
     return 0
 
 
@@ -66,11 +72,6 @@ def _configuration(reader: str, config: Path | None) -> None:
     if config is None:
         raise InputError(f"--format {reader}", "needs --config, the daemon's file that says where the registers are")
     print(configuration(reader, load_valves(config), str(config)), end="")
-
-
-def _map() -> list[dict[str, object]]:
-
-    return [_row(register) for register in sorted(REGISTERS, key=lambda register: register.address)]
 
 
 def _row(register: Register) -> dict[str, object]:
@@ -89,11 +90,6 @@ def _row(register: Register) -> dict[str, object]:
         register.text,
     )
     return dict(zip(COLUMNS, values, strict=True))
-
-
-def _reasons() -> list[dict[str, object]]:
-
-    return [{"number": int(reason), "name": reason.name.lower(), "text": reason.text} for reason in Refusal]
 
 
 def _markdown(rows: list[dict[str, object]]) -> None:
@@ -115,8 +111,3 @@ def _csv(rows: list[dict[str, object]]) -> None:
     writer = csv.DictWriter(sys.stdout, rows[0], lineterminator="\n")
     writer.writeheader()
     writer.writerows(rows)
-
-
-def _json(rows: list[dict[str, object]]) -> None:
-
-    print(json.dumps(rows, indent=1))

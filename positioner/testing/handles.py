@@ -14,7 +14,7 @@ AGENT, PROXY = "positioner.testing.agent", "positioner.testing.fault_proxy"
 COMMANDS = ("positioner.testing.tied", "positioner.cli")
 HOST = "127.0.0.1"
 HANDLE_POLL_S = 0.02
-LOST = 2.0
+QUALITY_LOST = 2.0
 """As `config.codes.Quality.LOST`, which is not loaded in somebody else's process."""
 
 
@@ -180,7 +180,7 @@ def daemon_running(folder: Path) -> Iterator[PositionerDaemon]:
         agent = Agent(AGENT, "daemon", str(port), log=folder / "daemon_agent.log")
         stack.callback(agent.end)
         handle = PositionerDaemon(HOST, port, folder, daemon, agent)
-        handle.until("quality", lambda quality: quality != LOST)
+        handle.until("quality", lambda quality: quality != QUALITY_LOST)
         yield handle
 
 

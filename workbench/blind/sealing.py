@@ -75,7 +75,7 @@ def seal(folder: Path, hidden: Hidden) -> str:
         write_recording(folder / "fit.csv", hidden.fit)
         write_recording(folder / "test.csv", hidden.test)
         (folder / "valve.toml").write_text(valve_toml(hidden.base), encoding="utf-8")
-        text = json.dumps({**hidden.answer, "files": _digests(folder)})
+        text = json.dumps({**hidden.answer, "files": {name: _sha256((folder / name).read_bytes()) for name in FILES}})
         sealed = {"sha256": _sha256(text.encode()), "answer_base64": base64.b64encode(text.encode()).decode()}
         (folder / SEALED).write_text(json.dumps(sealed, indent=1) + "\n", encoding="utf-8")
     return sealed["sha256"]
@@ -109,10 +109,6 @@ def reveal(folder: Path) -> tuple[str, Mapping[str, Any]]:
         if not (folder / name).is_file() or _sha256((folder / name).read_bytes()) != expected:
             raise CommandFailed(f"{folder / name}: is not the file that was sealed")
     return digest, answer
-
-
-def _digests(folder: Path) -> dict[str, str]:
-    return {name: _sha256((folder / name).read_bytes()) for name in FILES}
 
 
 def _sha256(content: bytes) -> str:

@@ -159,7 +159,8 @@ class _Running:
         self.examined = 0
         self.course = ValveCourse(name)
         try:
-            path = _valve_path(entries[0].file, manifest.folder)
+            written = entries[0].file
+            path = manifest.folder / written if written.endswith(".toml") else find_valve(written)
             self._model = self.course.given = valve_alone(load_valve(path), str(path), "a fleet is of valves")
         except InputError as error:
             for entry in entries:
@@ -218,10 +219,6 @@ class _Running:
         self.course.take(entry, found)
         if self._told:
             self._told(self.course.name, entry, found)
-
-
-def _valve_path(written: str, folder: Path) -> Path:
-    return folder / written if written.endswith(".toml") else find_valve(written)
 
 
 def since_day(course: ValveCourse) -> str:

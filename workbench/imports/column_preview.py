@@ -6,7 +6,7 @@ an archive with a row a value, the columns are the signals, called as the reader
 
 from collections import Counter
 from collections.abc import Iterator, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from itertools import islice
 from pathlib import Path
 
@@ -130,14 +130,10 @@ def columns_of_all(tables: Sequence[RawTable], first: Header) -> list[ColumnPrev
         values = signal_places(header)
         if table.sheet and len(values) == 1 and len(tables) > 1:
             signal = header.names[values[0]]
-            columns = [_rename(each, table.sheet) if each.name == signal else each for each in columns]
+            columns = [replace(each, name=table.sheet) if each.name == signal else each for each in columns]
         taken = {each.name for each in found}
         found += [each for each in columns if each.name not in taken]
     return found
-
-
-def _rename(column: ColumnPreview, name: str) -> ColumnPreview:
-    return ColumnPreview(name, column.unit, column.cells, column.unknown, column.clock)
 
 
 def _plain(header: Header) -> list[ColumnPreview]:

@@ -32,7 +32,6 @@ from workbench.imports.typed_tables import (
     by_length,
     column_rows,
     first_line,
-    no_vectors,
     vectors_of,
     with_unit,
 )
@@ -224,5 +223,5 @@ def _tables(columns: Columns, name: str, group: str = "") -> list[RawTable]:
 
 def _require_tables(path: Path, tables: list[RawTable]) -> list[RawTable]:
     if not tables:
-        raise no_vectors(path)
+        raise InputError(str(path), "holds no vectors of numbers; save time, position and command as vectors")
     return tables

@@ -10,7 +10,6 @@ ZT;12:00:00;20.1;Good
 
 from collections.abc import Iterator, Sequence
 from dataclasses import replace
-from functools import partial
 from itertools import islice, zip_longest
 
 from config.errors import InputError
@@ -48,7 +47,7 @@ def turn_table(table: RawTable) -> RawTable | None:
         table,
         what=f"{table.what}, a row a signal",
         place="value",
-        rows=partial(_number_rows, columns),
+        rows=lambda: enumerate(map(list, columns), start=1),
         length=len(columns),
     )
 
@@ -57,10 +56,6 @@ def _is_signal(cells: Sequence[Cell]) -> bool:
     name, *values = cells
     numbers = [cell for cell in values if cell != ""]
     return name != "" and not begins_number(name) and 2 * sum(map(begins_number, numbers)) > len(numbers) > 0
-
-
-def _number_rows(rows: Sequence[Sequence[Cell]]) -> Iterator[tuple[int, list[Cell]]]:
-    yield from ((number, list(cells)) for number, cells in enumerate(rows, start=1))
 
 
 def signals_in(header: Header) -> list[str]:

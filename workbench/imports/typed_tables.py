@@ -82,11 +82,6 @@ def _cell(value: object) -> Cell:
     return str(value).strip()
 
 
-def no_vectors(path: Path) -> InputError:
-    """Return what to say of a file without vectors."""
-    return InputError(str(path), "holds no vectors of numbers; save time, position and command as vectors")
-
-
 def by_length(columns: Mapping[str, Any]) -> Iterator[tuple[int, dict[str, Any]]]:
     """Yield the lengths of columns, the longest first, and the columns of each."""
     for length in sorted({len(each) for each in columns.values()}, reverse=True):

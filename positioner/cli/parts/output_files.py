@@ -58,7 +58,7 @@ def _files(value: object) -> Iterator[Path]:
             yield Path(each)
 
 
-def make_folder(folder: Path, option: str = "--out") -> None:
+def make_folder(folder: Path) -> None:
     """Make a folder, and those above it, unless it is there; files can be written there then.
 
     Raises:
@@ -67,9 +67,9 @@ def make_folder(folder: Path, option: str = "--out") -> None:
     try:
         folder.mkdir(parents=True, exist_ok=True)
     except OSError as error:
-        raise _unwritable(option, folder, error) from None
+        raise _unwritable("--out", folder, error) from None
     if not os.access(folder, os.W_OK | os.X_OK):
-        raise _unwritable(option, folder, OSError(errno.EACCES, os.strerror(errno.EACCES)))
+        raise _unwritable("--out", folder, OSError(errno.EACCES, os.strerror(errno.EACCES)))
 
 
 def writable(path: Path | None, option: str) -> None:
