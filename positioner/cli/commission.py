@@ -40,7 +40,7 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
         parser,
         text="the daemon's file, without [valve] stroke_m if it is not known; stop the daemon first",
     )
-    parser.add_argument("--valve", dest="name", metavar="NAME", help="its name, where the daemon's file has several")
+    parser.add_argument("--valve", dest="name", metavar="NAME", help="the valve's name, where the file has several")
     parser.add_argument("--yes", action="store_true", help="move the valve and write the result without a question")
     parser.add_argument("--keep", choices=KINDS, help="keep the result under this name")
     parser.add_argument("--json", type=Path, metavar="FILE", help="write verdict, figures and proposals as JSON")

@@ -42,7 +42,7 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
     add_pressure(parser)
     parser.add_argument("--budget", type=int, default=60, metavar="MOVES", help="largest number of moves")
     parser.add_argument("--out", type=Path, default=Path("discriminated"), help="folder for recordings and verdict")
-    parser.add_argument("--name", help="its name, where the daemon's file has several")
+    parser.add_argument("--name", help="the valve's name, where the file has several")
     add_tls(parser, ", with a certificate of role engineer")
     parser.add_argument("--seed", type=int, default=0, help="seed of the experiments")
 

@@ -10,7 +10,7 @@ if TYPE_CHECKING:
     from config.daemon_file import DaemonFile
     from drivers.boundary import Driver, Reading
 
-HELP = "print one measurement a second, with its age and whether it is plausible; moves nothing"
+HELP = "print one measurement a second, and whether it is plausible; moves nothing"
 EXAMPLE = "positioner probe daemon.toml --count 5"
 
 BURST = 50
@@ -20,7 +20,7 @@ BURST = 50
 def add_arguments(parser: argparse.ArgumentParser) -> None:
     """Declare the command line."""
     add_config(parser)
-    parser.add_argument("--valve", help="its name, where the daemon's file has several")
+    parser.add_argument("--valve", help="the valve's name, where the file has several")
     parser.add_argument("--count", type=int, default=0, help="number of lines; 0: until Ctrl-C")
 
 

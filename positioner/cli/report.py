@@ -15,7 +15,7 @@ EXAMPLE = "positioner report site.toml -o FV-101.html --recommended seat_load_n=
 def add_arguments(parser: argparse.ArgumentParser) -> None:
     """Declare the command line."""
     add_config(parser)
-    parser.add_argument("--valve", dest="name", metavar="NAME", help="its name, where the daemon's file has several")
+    parser.add_argument("--valve", dest="name", metavar="NAME", help="the valve's name, where the file has several")
     parser.add_argument(
         "--recommended",
         nargs="+",

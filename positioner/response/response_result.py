@@ -62,6 +62,10 @@ class ResponseFigures(Result):
     def _input_unit(self) -> tuple[float, str]:
         return (1e3, "mm") if self.input == "reference_m" else (1e-3, "kPa")
 
+    @property
+    def _gain_unit(self) -> str:
+        return "m/m" if self.input == "reference_m" else "m/Pa"
+
     def blocks(self) -> list[Block]:
         """Say the figures of each step and of all, or why there are none."""
         notes = [f"note: {note}" for note in self.notes]
@@ -69,11 +73,10 @@ class ResponseFigures(Result):
             return ["no step", *notes]
         scale, unit = self._input_unit
         noise = "" if self.noise_m is None else f", scatter at rest {1e3 * self.noise_m:.3g} mm"
-        gain_unit = "m/m" if self.input == "reference_m" else "m/Pa"
         return [
             f"{len(self.steps)} steps of {self.input}{noise}",
             self._table(),
-            _label_figure("static gain", self.static_gain, 1.0, gain_unit),
+            _label_figure("static gain", self.static_gain, 1.0, self._gain_unit),
             _label_figure("dead band", self.dead_band, scale, unit),
             _label_figure("resolution", self.resolution, scale, unit),
             *self._explain_missing(),
@@ -87,7 +90,7 @@ class ResponseFigures(Result):
             "time s",
             f"from {unit}",
             f"to {unit}",
-            *(f"{name} {of}".strip() for name, of, _, _ in COLUMNS),
+            *(f"{name} {of or self._gain_unit}" for name, of, _, _ in COLUMNS),
         )
         rows = [
             (

@@ -21,7 +21,7 @@ def add_connection(parser: argparse.ArgumentParser) -> None:
     parser.add_argument(
         "--config", type=Path, metavar="CONFIG.toml", help="the daemon's file, which names host and port"
     )
-    parser.add_argument("--valve", metavar="NAME", help="its name, where the daemon's file has several")
+    parser.add_argument("--valve", metavar="NAME", help="the valve's name, where the file has several")
     parser.add_argument("--host", help="the daemon's host (127.0.0.1)")
     parser.add_argument("--port", type=_whole("a port", 1, 65535), help="its supervisory port (5502)")
     parser.add_argument("--unit", type=_whole("a Modbus unit", 0, 255), help="the valve's Modbus unit (1)")

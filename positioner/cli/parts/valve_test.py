@@ -41,7 +41,7 @@ LEFT_WITH = {
 def add_test_arguments(parser: argparse.ArgumentParser, *, recordings: bool = True) -> None:
     """Declare the options of every test."""
     add_config(parser, text="the running daemon's file, with [recorder]")
-    parser.add_argument("--valve", dest="name", metavar="NAME", help="its name, where the daemon's file has several")
+    parser.add_argument("--valve", dest="name", metavar="NAME", help="the valve's name, where the file has several")
     if recordings:
         parser.add_argument(
             "--rec", type=Path, nargs="+", metavar="REC", help="evaluate these recordings of such a test; nothing moves"
