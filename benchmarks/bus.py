@@ -23,10 +23,12 @@ from config.device import ModbusTcpDevice
 from config.modbus_map import SIMULATED_MAP
 from drivers.modbus_tcp import ModbusTcpDriver
 from fieldbus.modbus.client import ModbusClient
+from positioner.testing.child_process import port_in
 
 CYCLES, WARM_UP = 4000, 200
 BLOCK, STRETCH = 50, 100
 PUSH_PA = 60e3
+ANY_PORT = ("--listen-port", "0")
 SLAVE = "[clock]\nmode = 'lockstep'\n[sensor]\nnoise_std_m = 1e-5\n"
 COMMAND = SIMULATED_MAP.command_pa
 
@@ -136,16 +138,30 @@ def driver_alone(port: int) -> list[float]:
 @contextmanager
 def slave() -> Iterator[int]:
     """Run a simulated slave in lockstep; give its port."""
-    with tempfile.TemporaryDirectory() as folder:
-        file = Path(folder, "slave.toml")
-        file.write_text(SLAVE)
-        command = [sys.executable, "-m", "positioner.cli", "sim", str(file), "--listen-port", "0"]
-        with subprocess.Popen(command, stdout=subprocess.PIPE, text=True) as process:
-            try:
-                assert process.stdout is not None
-                yield int(process.stdout.readline().rsplit(":", 1)[1])
-            finally:
-                process.terminate()
+    with tempfile.TemporaryDirectory() as folder, slave_process(Path(folder, "slave.toml"), "", *ANY_PORT) as ready:
+        yield port_in(ready)
+
+
+@contextmanager
+def slave_process(file: Path, bus: str, *options: str) -> Iterator[str]:
+    """Run a simulated slave in lockstep; give the line that says it is ready.
+
+    Args:
+        file: that it is given, written here.
+        bus: tables of its bus.
+        options: of its command line.
+    """
+    file.write_text(bus + SLAVE)
+    command = [sys.executable, "-m", "positioner.cli", "sim", str(file), *options]
+    with subprocess.Popen(command, stdout=subprocess.PIPE, text=True) as process:
+        try:
+            assert process.stdout is not None
+            ready = process.stdout.readline()
+            if not ready:
+                raise RuntimeError("the slave did not start")
+            yield ready.strip()
+        finally:
+            process.terminate()
 
 
 if __name__ == "__main__":

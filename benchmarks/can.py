@@ -7,8 +7,6 @@ so the ratios hold on a noisy machine; the two buses do in blocks, in which what
 """
 
 import statistics
-import subprocess
-import sys
 import tempfile
 import threading
 from collections.abc import Callable, Iterator
@@ -17,19 +15,13 @@ from pathlib import Path
 
 import canopen
 
-from benchmarks.bus import BLOCK, CYCLES, PUSH_PA, measured, ratio
-from benchmarks.cycle_time import DAEMON, FIRST, full_loop
+from benchmarks.bus import ANY_PORT, BLOCK, CYCLES, PUSH_PA, measured, ratio, slave_process
+from benchmarks.cycle_time import daemon_loop
 from config.canopen_device import SHIPPED_EDS, CanBus, CanopenDevice
 from drivers import driver_for
 from drivers.boundary import DriverError
 from fieldbus.canopen.eds import read_eds
 from fieldbus.canopen.objects import ACTIVATE
-from positioner.control.controller import Controller
-from positioner.control.settings import Settings
-from positioner.daemon.cycle import Cycle
-from positioner.daemon.link import Link
-from positioner.daemon.pacing import DevicePace
-from positioner.daemon.recorder import Recorder
 
 TARGET_BUS, TARGET_DAEMON = 1.5, 0.8
 ROUNDS = 5
@@ -53,7 +45,9 @@ def report() -> list[str]:
             unusable = f"udp_multicast cannot be used here: {error}"
         else:
             unusable = ""
-        ways["the daemon's full cycle"] = stack.enter_context(daemon_loop(stack.enter_context(node())))
+        ways["the daemon's full cycle"] = stack.enter_context(
+            daemon_loop(driver_for(device_on(stack.enter_context(node()))))
+        )
         times = measured(ways)
     middles = {name: statistics.median(taken) for name, taken in times.items()}
     bare = middles["bare canopen, loopback bus"]
@@ -141,49 +135,19 @@ def driver_loop(bus: CanBus) -> Iterator[Callable[[], object]]:
 
 
 @contextmanager
-def daemon_loop(bus: CanBus) -> Iterator[Callable[[], object]]:
-    """Give one cycle of the daemon, its DCS and recorder included."""
-    pace = DevicePace()
-    link = Link(driver_for(device_on(bus)), pace)
-    held_pa, _ = link.open()
-    with tempfile.TemporaryDirectory() as folder:
-        recorder = Recorder(Path(folder), "v", 50_000_000, 2)
-        cycle = Cycle(link, Controller(Settings.of(DAEMON), held_pa), pace, FIRST, recorder)
-        recorder.start()
-        yield full_loop(cycle)
-        recorder.stop()
-    link.release()
-
-
-@contextmanager
 def node(bus: CanBus | None = None) -> Iterator[CanBus]:
     """Run a simulated slave in lockstep; give its bus. By default it is alone on a loopback bus."""
     table = CanBus() if bus is None else bus
     options = "".join(f"{name} = {str(value).lower()}\n" for name, value in table.options.items())
-    with tempfile.TemporaryDirectory() as folder:
-        file = Path(folder, "slave.toml")
-        file.write_text(
-            f'[bus]\nkind = "canopen"\ninterface = "{table.interface}"\nchannel = "{table.channel}"\n'
-            f"node = {table.node}\n[bus.options]\n{options}"
-            "[clock]\nmode = 'lockstep'\n[sensor]\nnoise_std_m = 1e-5\n"
-        )
-        command = [
-            sys.executable,
-            "-m",
-            "positioner.cli",
-            "sim",
-            str(file),
-            *(("--listen-port", "0") if bus is None else ()),
-        ]
-        with subprocess.Popen(command, stdout=subprocess.PIPE, text=True) as process:
-            try:
-                assert process.stdout is not None
-                ready = process.stdout.readline()
-                if not ready:
-                    raise RuntimeError("the slave did not start")
-                yield table if bus else table.model_copy(update={"channel": ready.strip().rsplit(":", 1)[1]})
-            finally:
-                process.terminate()
+    text = (
+        f'[bus]\nkind = "canopen"\ninterface = "{table.interface}"\nchannel = "{table.channel}"\n'
+        f"node = {table.node}\n[bus.options]\n{options}"
+    )
+    with (
+        tempfile.TemporaryDirectory() as folder,
+        slave_process(Path(folder, "slave.toml"), text, *(() if bus else ANY_PORT)) as ready,
+    ):
+        yield table if bus else table.model_copy(update={"channel": ready.rsplit(":", 1)[1]})
 
 
 if __name__ == "__main__":

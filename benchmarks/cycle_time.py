@@ -8,11 +8,13 @@ each begins, as in real time, with the caches of others' work. Half of the time 
 import statistics
 import tempfile
 import time
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Iterator, Sequence
+from contextlib import contextmanager
 from dataclasses import replace
 from pathlib import Path
 
 from pymodbus.client import ModbusTcpClient
+from pymodbus.client.base import ModbusBaseSyncClient
 
 from benchmarks.bus import COMMAND, PUSH_PA, measured, ratio, slave
 from config.codes import Mode, State
@@ -21,6 +23,7 @@ from config.device import ModbusTcpDevice
 from config.slave_file import SlaveFile
 from config.valve_file import shipped_valve
 from drivers import driver_for
+from drivers.boundary import Driver
 from positioner.control.controller import Controller
 from positioner.control.requests import QUIET, Requests
 from positioner.control.sample import Sample
@@ -47,9 +50,7 @@ def report() -> list[str]:
     bare_us, full_us = full_cycle()
     core_us = core_alone()
     return [
-        f"bare pymodbus, function 23        {1e6 / statistics.median(bare_us):7.0f} cycles/s",
-        f"the daemon's full cycle           {1e6 / statistics.median(full_us):7.0f} cycles/s",
-        f"ratio                             {ratio(bare_us, full_us)}, target at least {TARGET_RATIO}",
+        *rates("pymodbus", bare_us, full_us),
         *(
             f"control core alone, {name:14}{statistics.fmean(each):7.1f} us a step on average, median "
             f"{statistics.median(each):.1f}, 99 % {sorted(each)[int(0.99 * len(each))]:.1f}"
@@ -81,26 +82,46 @@ def busy_dcs() -> Script:
 
 def full_cycle() -> tuple[list[float], list[float]]:
     """Return the times of bare and full cycles, us."""
-    with slave() as port, slave() as other_port, tempfile.TemporaryDirectory() as folder:
-        pace = DevicePace()
-        link = Link(driver_for(ModbusTcpDevice(port=port, reply_timeout_s=1.0)), pace)
-        held_pa, _ = link.open()
-        recorder = Recorder(Path(folder), "v", 50_000_000, 2)
-        cycle = Cycle(link, Controller(Settings.of(DAEMON), held_pa), pace, FIRST, recorder)
-        recorder.start()
-        with ModbusTcpClient("127.0.0.1", port=other_port) as bare:
-            times = measured({"bare": bare_loop(bare), "full": full_loop(cycle)})
-        recorder.stop()
-        link.release()
+    with (
+        slave() as port,
+        slave() as other_port,
+        daemon_loop(driver_for(ModbusTcpDevice(port=port, reply_timeout_s=1.0))) as full,
+        ModbusTcpClient("127.0.0.1", port=other_port) as bare,
+    ):
+        times = measured({"bare": bare_loop(bare), "full": full})
     return times["bare"], times["full"]
 
 
-def bare_loop(client: ModbusTcpClient) -> Callable[[], object]:
+def rates(protocol: str, bare_us: Sequence[float], full_us: Sequence[float]) -> list[str]:
+    """Return lines: cycles a second of the bare loop and of the full cycle, and their ratio."""
+    return [
+        f"{f'bare {protocol}, function 23':34}{1e6 / statistics.median(bare_us):7.0f} cycles/s",
+        f"the daemon's full cycle           {1e6 / statistics.median(full_us):7.0f} cycles/s",
+        f"ratio                             {ratio(bare_us, full_us)}, target at least {TARGET_RATIO}",
+    ]
+
+
+def bare_loop(client: ModbusBaseSyncClient) -> Callable[[], object]:
     """Return one cycle of a loop that only talks."""
     words = COMMAND.format.encode(PUSH_PA)
     return lambda: client.readwrite_registers(
         read_address=0, read_count=COMMAND.address, write_address=COMMAND.address, values=words
     )
+
+
+@contextmanager
+def daemon_loop(driver: Driver) -> Iterator[Callable[[], object]]:
+    """Give one cycle of the daemon on a device, its DCS and recorder included."""
+    pace = DevicePace()
+    link = Link(driver, pace)
+    held_pa, _ = link.open()
+    with tempfile.TemporaryDirectory() as folder:
+        recorder = Recorder(Path(folder), "v", 50_000_000, 2)
+        cycle = Cycle(link, Controller(Settings.of(DAEMON), held_pa), pace, FIRST, recorder)
+        recorder.start()
+        yield full_loop(cycle)
+        recorder.stop()
+    link.release()
 
 
 def full_loop(cycle: Cycle) -> Callable[[], object]:

@@ -4,8 +4,6 @@ Both talk, in turn, to simulated slaves of the same kind, processes of their own
 """
 
 import statistics
-import subprocess
-import sys
 import tempfile
 import time
 from collections.abc import Iterator
@@ -14,24 +12,18 @@ from pathlib import Path
 
 from pymodbus.client import ModbusTlsClient
 
-from benchmarks.bus import COMMAND, PUSH_PA, measured, ratio
-from benchmarks.cycle_time import DAEMON, FIRST, full_loop
+from benchmarks.bus import ANY_PORT, measured, slave_process
+from benchmarks.cycle_time import bare_loop, daemon_loop, rates
 from config.device import ModbusTcpDevice
 from config.roles import Role
 from config.tls_table import Tls
 from drivers import driver_for
 from fieldbus.modbus.tls import client_context
 from positioner.cli.parts.trial_authority import Authority, Owner
-from positioner.control.controller import Controller
-from positioner.control.settings import Settings
-from positioner.daemon.cycle import Cycle
-from positioner.daemon.link import Link
-from positioner.daemon.pacing import DevicePace
-from positioner.daemon.recorder import Recorder
+from positioner.testing.child_process import port_in
 
 CYCLES = 4000
 HANDSHAKES = 50
-TARGET_RATIO = 0.8
 
 
 def report() -> list[str]:
@@ -39,12 +31,9 @@ def report() -> list[str]:
     with tempfile.TemporaryDirectory() as name:
         tls = certificates(Path(name))
         with slave(Path(name, "a.toml")) as port, slave(Path(name, "b.toml")) as other_port:
-            times, connect_s = full_cycle(Path(name), tls, port, other_port)
-    bare_us, full_us = statistics.median(times["bare"]), statistics.median(times["full"])
+            times, connect_s = full_cycle(tls, port, other_port)
     return [
-        f"bare pymodbus TLS, function 23    {1e6 / bare_us:7.0f} cycles/s",
-        f"the daemon's full cycle           {1e6 / full_us:7.0f} cycles/s",
-        f"ratio                             {ratio(times['bare'], times['full'])}, target at least {TARGET_RATIO}",
+        *rates("pymodbus TLS", times["bare"], times["full"]),
         f"open, handshake included          {1e3 * statistics.median(connect_s):7.1f} ms",
     ]
 
@@ -57,48 +46,26 @@ def certificates(folder: Path) -> Tls:
     return Tls(authority=folder / "authority.pem", certificate=folder / "daemon.pem", key=folder / "daemon.key")
 
 
-def full_cycle(folder: Path, tls: Tls, port: int, other_port: int) -> tuple[dict[str, list[float]], list[float]]:
+def full_cycle(tls: Tls, port: int, other_port: int) -> tuple[dict[str, list[float]], list[float]]:
     """Return the times of bare and full cycles, us, and of opening the driver, s."""
-    pace = DevicePace()
     driver = driver_for(ModbusTcpDevice(port=port, reply_timeout_s=1.0, tls=tls))
     connect_s = []
     for _ in range(HANDSHAKES):
         start_s = time.perf_counter()
         driver.open()
         connect_s.append(time.perf_counter() - start_s)
-    link = Link(driver, pace)
-    held_pa, _ = link.open()
-    recorder = Recorder(folder / "recordings", "v", 50_000_000, 2)
-    cycle = Cycle(link, Controller(Settings.of(DAEMON), held_pa), pace, FIRST, recorder)
-    recorder.start()
-    words = COMMAND.format.encode(PUSH_PA)
     context = client_context(tls)
     context.check_hostname = False  # the bare client cannot
-    with ModbusTlsClient("127.0.0.1", port=other_port, sslctx=context) as bare:
-        ways = {
-            "bare": lambda: bare.readwrite_registers(
-                read_address=0, read_count=COMMAND.address, write_address=COMMAND.address, values=words
-            ),
-            "full": full_loop(cycle),
-        }
-        times = measured(ways, CYCLES)
-    recorder.stop()
-    link.release()
-    return times, connect_s
+    with daemon_loop(driver) as full, ModbusTlsClient("127.0.0.1", port=other_port, sslctx=context) as bare:
+        return measured({"bare": bare_loop(bare), "full": full}, CYCLES), connect_s
 
 
 @contextmanager
 def slave(file: Path) -> Iterator[int]:
     """Run a simulated slave in lockstep, its certificates beside its file; give its port."""
-    table = "authority = 'authority.pem'\ncertificate = 'device.pem'\nkey = 'device.key'\n"
-    file.write_text(f"[clock]\nmode = 'lockstep'\n[sensor]\nnoise_std_m = 1e-5\n[bus.tls]\n{table}")
-    command = [sys.executable, "-m", "positioner.cli", "sim", str(file), "--listen-port", "0"]
-    with subprocess.Popen(command, stdout=subprocess.PIPE, text=True) as process:
-        try:
-            assert process.stdout is not None
-            yield int(process.stdout.readline().rsplit(":", 1)[1])
-        finally:
-            process.terminate()
+    table = "[bus.tls]\nauthority = 'authority.pem'\ncertificate = 'device.pem'\nkey = 'device.key'\n"
+    with slave_process(file, table, *ANY_PORT) as ready:
+        yield port_in(ready)
 
 
 if __name__ == "__main__":
