@@ -22,12 +22,16 @@ def bench(
     yield_m: float = 0.0,
     viscous_ns_per_m: float = VISCOUS_NS_PER_M,
     extra_ns_per_m: float = 0.0,
+    period_s: float = 0.02,
 ) -> Recording:
-    """A rig pulls the stem up and down, each stroke at its own speed, at a pressure that swings by a fifth."""
+    """A rig pulls the stem up and down, each stroke at its own speed, at a pressure that swings by a fifth.
+
+    The longer the period, the more the rows at reversals are off, which count for one direction or the other.
+    """
     generator = np.random.default_rng(seed)
     corners_m = 0.05 + 0.045 * np.where(np.arange(13) % 2, 1.0, -1.0) * generator.uniform(0.7, 1.0, 13)
     at_s = np.cumsum([0.0, *np.exp(generator.uniform(np.log(1.5), np.log(15.0), 12))])
-    time_s: Column = 0.01 * np.arange(round(100.0 * at_s[-1]))
+    time_s: Column = period_s * np.arange(round(at_s[-1] / period_s))
     position_m = np.interp(time_s, at_s, corners_m)
     velocity = np.gradient(position_m, time_s)
     direction = np.sign(velocity)

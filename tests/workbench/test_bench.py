@@ -7,6 +7,7 @@ import pytest
 
 from config.errors import InputError
 from positioner.cli.main import main
+from workbench.bench import scores
 from workbench.bench.cases import Case, read_cases, write_cases
 from workbench.bench.scores import Answer, add_results, area, area_interval, read_results, tell_scores
 
@@ -21,8 +22,9 @@ def test_the_area_is_the_share_of_pairs_in_the_right_order() -> None:
 
 
 def test_cases_go_into_a_folder_once_and_a_rivals_file_is_judged_beside_ours(
-    tmp_path: Path, capsys: pytest.CaptureFixture[str]
+    tmp_path: Path, capsys: pytest.CaptureFixture[str], monkeypatch: pytest.MonkeyPatch
 ) -> None:
+    monkeypatch.setattr(scores, "DRAWN_ANEW", 20)
     folder = tmp_path / "cases"
     words = ["bench", str(folder), "--drawn", "2", "--first-seed", "10", "--workers", "1"]
     assert main(words) == 0

@@ -31,6 +31,8 @@ Capture = pytest.CaptureFixture[str]
 
 
 FOUR_PA = (5e4, 1.5e5, 2.5e5, 3.5e5)
+FINE_S = 0.01
+"""Period where numbers are held to per cents."""
 
 
 @cache
@@ -41,7 +43,7 @@ def diagnosed(seed: int = 1, **hidden: float) -> ForceDiagnosis:
 @pytest.mark.parametrize("seed", few_always([1, 9]))
 def test_nothing_hidden_nothing_found(seed: int) -> None:
     """The rows at reversals, which count for one direction or the other, bias viscous friction by some per cent."""
-    found = diagnosed(seed)
+    found = diagnosed(seed, period_s=FINE_S)
     assert found.verdict == "adequate", found.sentence
     assert found.missing == ()
     true = {
@@ -71,7 +73,8 @@ def test_friction_that_grows_otherwise_than_pressure_is_told_from_one_that_grows
     growth_n: float, exponent: float
 ) -> None:
     levels = enumerate(FOUR_PA)
-    found = diagnose_forces([bench(level_pa, i, growth_n=growth_n, exponent=exponent) for i, level_pa in levels], VALVE)
+    grows = {"growth_n": growth_n, "exponent": exponent, "period_s": FINE_S}
+    found = diagnose_forces([bench(level_pa, i, **grows) for i, level_pa in levels], VALVE)
     assert found.missing == ("pressure_power_friction",)
     assert found.best.parameters["pressure_power_friction.exponent"] == exponent
     assert found.best.parameters["pressure_power_friction.growth_n"] == pytest.approx(growth_n, rel=0.1)
