@@ -6,11 +6,14 @@ import pytest
 
 from benchmarks.kept_law import FIGURES, LINES_FILE, VALVES_PLAYED, changes, line, seeds
 from benchmarks.kept_lines import Line, kept
+from tests.cases import few_always
 
 LINES = kept(LINES_FILE)
+IN_SHORT = 4
+"""Of twelve valves those that `make test` plays: one landing that differs shows in each."""
 
 
-@pytest.mark.parametrize("before", LINES, ids=lambda each: str(each["seed"]))
+@pytest.mark.parametrize("before", few_always(LINES, IN_SHORT), ids=lambda each: str(each["seed"]))
 def test_the_law_does_on_a_valve_what_it_did(before: Line) -> None:
     assert changes(before, line(before["seed"])) == [], "python -m benchmarks.kept_law says it of all"
 

@@ -20,7 +20,7 @@ from workbench.diagnosis.diagnosis import Diagnosis, diagnose
 from workbench.fleet.examination import examine
 
 HEAD = "valve,file,recording,when\n"
-ROWS, PERIOD_S = 1000, 0.02
+ROWS, PERIOD_S = 700, 0.02
 TIGHTER = {"coulomb_n": 2200.0, "static_n": 2600.0}
 PLAY = {"name": "backlash", "width_m": 4e-3}
 FEW = ["asymmetric_friction", "backlash"]

@@ -18,7 +18,7 @@ Spoil = Callable[[dict[str, Column], Column], dict[str, Column]]
 
 @cache
 def hidden(seed: int) -> Hidden:
-    return hide(seed, duration_s=20.0)
+    return hide(seed, duration_s=12.0)
 
 
 REFUSED: dict[str, tuple[Spoil, str]] = {
@@ -61,7 +61,7 @@ def test_what_the_command_did_not_do_is_not_judged(case: str) -> None:
 
 
 def test_ten_bits_are_said_and_no_effect_is_named_for_them() -> None:
-    bare = hide(307, duration_s=20.0, effects=0)
+    bare = hide(307, duration_s=12.0, effects=0)
     quantum_m = SEED.valve.stroke_m / 1024.0
     columns = dict(bare.fit.columns)
     rounded_m = quantum_m * np.round(columns["position_m"] / quantum_m)

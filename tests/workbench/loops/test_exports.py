@@ -21,7 +21,7 @@ ROWS: list[Row] = [
     (BEGIN + timedelta(seconds=float(time_s)), {"OP": op, "PV": pv, "SP": sp})
     for time_s, op, pv, sp in zip(LOOP.time_s, LOOP.op_pct, LOOP.pv, LOOP.sp, strict=True)
 ]
-SOME = ROWS[:300]
+SOME = ROWS[:120]
 """Enough to be read."""
 NAMES = ("OP", "PV", "SP")
 
