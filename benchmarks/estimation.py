@@ -240,8 +240,9 @@ def _restarts() -> list[str]:
     lines = ["restarted so long after the motion began, noise 1e-4 p.u.: reported deviation of a, b, c, b/c, %"]
     for late in (0, 2, 5, 10, 20, 50):
         identifier = Identifier(WINDOW_S, SETTINGS.stroke_m, SETTINGS.pressure_pa)
-        for sample in zip(*(column[REST + late : REST + 801].tolist() for column in (t, x, u)), strict=True):
-            identifier.update(*sample)
+        rows = slice(REST + late, REST + 801)
+        for time_s, position_m, pressure_pa in zip(t[rows].tolist(), x[rows].tolist(), u[rows].tolist(), strict=True):
+            identifier.update(time_s, position_m, pressure_pa)
         solution = identifier.solve(noise_m)
         assert solution is not None
         _, b, c = solution.theta.tolist()
