@@ -76,6 +76,7 @@ def run(arguments: argparse.Namespace) -> int:
     from workbench.data.imposed_motion import is_imposed
     from workbench.diagnosis.diagnosis import diagnose
     from workbench.diagnosis.diagnosis_json import as_json
+    from workbench.diagnosis.measured_pressure import ByMeasuredPressure
     from workbench.report import Subject, report_diagnosis
 
     for option in ("experiment", "out"):
@@ -108,7 +109,7 @@ def run(arguments: argparse.Namespace) -> int:
     for command in commands:
         alone = "to refit it" if diagnosis.parameters_off else "to add it"
         print(f"{alone}: {command}" if len(commands) == 1 else f"one of: {command}")
-    if diagnosis.by_pressure:
+    if diagnosis.doubt(ByMeasuredPressure):
         print(f"to diagnose the stem by the measured pressure: {by_pressure_command(arguments)}")
     if diagnosis.verdict == "unexplained":
         print(f"to look for a formula of what is missing: {discover_command(arguments)}")

@@ -8,6 +8,7 @@ from workbench.blind.hiding import hide
 from workbench.diagnosis import imitating_effect
 from workbench.diagnosis.diagnosis import diagnose
 from workbench.diagnosis.diagnosis_json import as_json
+from workbench.diagnosis.imitating_effect import StandIn
 from workbench.discover import form_search
 from workbench.discover.form_search import SearchedForms
 from workbench.discover.grammar import FORMS
@@ -34,12 +35,13 @@ def test_two_effects_that_imitate_a_flow_force_which_was_not_tried_are_no_explan
     monkeypatch.setattr(form_search, "FORMS", tuple(each for each in FORMS if each.name in FEW))
     found = diagnose(hidden.fit, hidden.base, effects=NAMED)
     assert found.best.explained, "it reaches the floor: by what is left alone it would be called all that is missing"
-    assert found.stand_in is not None
-    assert (found.verdict, found.missing, found.stand_in.form) == ("unexplained", NAMED, FEW[0])
+    stand_in = found.doubt(StandIn)
+    assert stand_in is not None
+    assert (found.verdict, found.missing, stand_in.form) == ("unexplained", NAMED, FEW[0])
     assert found.best.fit.terms.landings.mean_square > 2.0, "slides end elsewhere, however small the error"
-    assert found.stand_in.form_rmse_m < found.stand_in.named_rmse_m
-    assert found.sentence.endswith(f" {found.stand_in.sentence}.")
+    assert stand_in.form_rmse_m < stand_in.named_rmse_m
+    assert found.sentence.endswith(f" But {stand_in.sentence(found.kind)}.")
     assert as_json(found)["stand_in"]["form"] == FEW[0]
     assert FEW[0] in [each.name for each in asked[0].candidates]
     right = diagnose(hidden.fit, hidden.base, effects=("flow_force",))
-    assert (right.verdict, right.missing, right.stand_in) == ("missing", ("flow_force",), None)
+    assert (right.verdict, right.missing, right.doubts) == ("missing", ("flow_force",), ())

@@ -9,7 +9,7 @@ from tests.workbench.hand_made import LIBRARY, fit_of
 from tests.workbench.valves import SEED, drawn_valve, record_of, with_effect
 from workbench.data.held_out import split
 from workbench.diagnosis.error_before_fit import AsGiven
-from workbench.diagnosis.moved_parameters import Moved, moved_parameters
+from workbench.diagnosis.moved_parameters import Moved, excluded_parameters
 from workbench.fit.fitted_parameter import Fitted
 from workbench.fit.fitting import fit
 from workbench.select.block_errors import block_errors
@@ -20,7 +20,7 @@ def moved(before_n: float, lower_n: float, upper_n: float) -> tuple[Moved, ...]:
     value_n = 0.5 * (lower_n + upper_n)
     found = Fitted(value_n, 1.0, lower_n, upper_n, at_bound=False, physical=True)
     fit = fit_of("preload", found={"preload.force_n": found})
-    return moved_parameters(ValveFile(valve=SEED.valve, effect=(preload,)), fit, LIBRARY)
+    return excluded_parameters(ValveFile(valve=SEED.valve, effect=(preload,)), fit, LIBRARY)
 
 
 def test_a_preload_that_the_recording_excludes_is_said_with_what_may_look_the_same() -> None:

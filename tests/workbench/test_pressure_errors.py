@@ -123,8 +123,9 @@ def test_what_the_i_p_hides_from_the_stem_is_no_friction() -> None:
     found = diagnose(recorded(BARE, hysteresis_pa=8e3), BARE, effects=("supply_limit",), workers=1)
     truly_n = BARE.valve.coulomb_n
     assert found.best.fit.parameters["coulomb_n"].value > 1.1 * truly_n
-    assert found.by_pressure is not None
-    after_n = {name: after for name, _, after in found.by_pressure.others}["coulomb_n"]
+    by_pressure = found.doubt(ByMeasuredPressure)
+    assert by_pressure is not None
+    after_n = {name: after for name, _, after in by_pressure.others}["coulomb_n"]
     assert after_n == pytest.approx(truly_n, rel=0.05), "of a transmitter that shows 2 % too much, and noise"
     assert "coulomb_n" in found.sentence
     assert not found.nothing_off
@@ -145,8 +146,9 @@ def test_so_is_one_of_a_transmitter_whose_noise_hangs_together() -> None:
     wanders_pa = np.convolve(noise, 1e3 * np.exp(-np.arange(40) / 8.0), "same")
     noisy = Recording({**recording.columns, "pressure_pa": recording.columns["pressure_pa"] + wanders_pa})
     found = diagnose(noisy, BARE, effects=(), workers=1)
-    assert found.by_pressure is not None
-    assert found.by_pressure.worse
+    by_pressure = found.doubt(ByMeasuredPressure)
+    assert by_pressure is not None
+    assert by_pressure.worse
 
 
 @pytest.mark.long
@@ -169,5 +171,5 @@ def test_by_its_measured_pressure_a_form_is_sought_of_the_stem_alone(monkeypatch
 def test_a_pressure_that_is_the_models_but_for_the_noise_is_not_spoken_of() -> None:
     assert NOISE_PA * BARE.valve.diaphragm_area_m2 > 0.01 * BARE.valve.coulomb_n
     found = diagnose(recorded(BARE), BARE, effects=("supply_limit",), workers=1)
-    assert found.by_pressure is None
+    assert found.doubts == ()
     assert found.nothing_off

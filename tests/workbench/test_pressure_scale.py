@@ -18,6 +18,8 @@ from workbench.data.record import Record, ready
 from workbench.diagnosis.command_or_pressure import ByCommand, by_command
 from workbench.diagnosis.diagnosis import diagnose
 from workbench.diagnosis.diagnosis_json import as_json
+from workbench.diagnosis.doubt import Case
+from workbench.diagnosis.error_before_fit import AsGiven
 from workbench.diagnosis.extension import extend
 from workbench.diagnosis.pressure_scale import pressure_scale
 from workbench.fit.fitting import fit
@@ -108,7 +110,18 @@ def asked(pressure_pa: Column) -> ByCommand | None:
     recording = by_pressure(pressure_pa)
     found = fit(recording, BARE, workers=1, free=("spring_n_per_m", "coulomb_n"), from_pressure=True)
     parts = split([recording])
-    return by_command(evaluated(found, parts), parts, workers=1, progress=lambda _what, _done: None)
+    case = Case(
+        verdict="unexplained",
+        best=evaluated(found, parts),
+        steps=(),
+        valve=BARE,
+        library={},
+        parts=parts,
+        given=AsGiven.of(BARE, parts, found),
+        workers=1,
+        progress=lambda _what, _done: None,
+    )
+    return by_command(case)
 
 
 def test_a_pressure_that_lags_drives_no_stem() -> None:

@@ -6,8 +6,9 @@ Its files:
     verdict, verdict_sentence                     what follows, and how it is said
     judged_landings                               how many landings a verdict rests on, where nothing else is judged
     error_before_fit                              what the file leaves before anything is fitted
+    doubt, doubts                                 what a verdict is asked before it is believed: a check a file
     moved_parameters                              what the file's own effects are by the recording
-    assumed_mass                                  what another mass than the valve file's would leave
+    kept_mass                                     what another mass than the valve file's would leave
     measured_pressure                             what the stem is from the measured pressure on
     command_or_pressure                           whether the measured pressure is what drives the stem
     pressure_scale                                whether the measured pressure is on the command's scale

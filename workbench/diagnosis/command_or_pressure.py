@@ -7,17 +7,16 @@ and an evidence of 10 in independent samples, the command is the better witness,
 """
 
 from dataclasses import dataclass
+from typing import Any
 
 from config.drive import Kind
-from config.results.result import Brief
-from workbench.data.held_out import Split
+from workbench.diagnosis.doubt import Case, Doubt
 from workbench.diagnosis.measured_pressure import driven_otherwise
-from workbench.select.effect_candidates import EvaluatedModel, outdoes
-from workbench.select.effect_search import Progress
+from workbench.select.effect_candidates import EvaluatedModel, model_json, outdoes
 
 
 @dataclass(frozen=True, slots=True, repr=False)
-class ByCommand(Brief):
+class ByCommand(Doubt):
     """A model that by the measured pressure leaves more than by the command."""
 
     by_pressure_rmse_m: float
@@ -35,19 +34,18 @@ class ByCommand(Brief):
             "another line. Diagnose by the command"
         )
 
+    def as_json(self) -> dict[str, Any]:
+        """Return the model by the command in plain types."""
+        return model_json(self.model)
 
-def by_command(best: EvaluatedModel, parts: Split, *, workers: int, progress: Progress) -> ByCommand | None:
+
+def by_command(case: Case) -> ByCommand | None:
     """Return what the best model by the measured pressure is by the command; None where it explains, or does as well.
 
     Nor is it asked of a set point, which is no pressure.
-
-    Args:
-        best: what was found.
-        parts: of the record, fitted and held out.
-        workers: threads.
-        progress: called with what is under way, and the fraction done.
     """
-    if not best.fit.from_pressure or best.explained or parts.train.record.by_setpoint:
+    best = case.best
+    if case.doubts or not best.fit.from_pressure or best.explained or case.parts.train.record.by_setpoint:
         return None
-    model = driven_otherwise(best, parts, workers=workers, progress=progress)
+    model = driven_otherwise(case)
     return ByCommand(best.errors.test_rmse_m, model) if outdoes(model, best) else None

@@ -7,7 +7,7 @@ accepted (`effect_candidates`, by the rule of `effect_acceptance`), from all ste
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, field
 from os import cpu_count
-from typing import TYPE_CHECKING, NamedTuple
+from typing import TYPE_CHECKING, TypeVar
 
 from config.arguments import kinds_held
 from config.drive import Kind
@@ -15,20 +15,17 @@ from config.recording import Recording
 from config.results.block import Block
 from config.results.result import Result
 from config.valve_file import ValveFile
-from sim.effect import Effect, find_effect, find_effects, tried_effects
+from sim.effect import find_effects, tried_effects
 from workbench.compare.comparison_sentences import shorten_notes
 from workbench.data.held_out import Split, split
 from workbench.data.noise_floor import UNKNOWN, say_m
-from workbench.diagnosis.assumed_mass import KeptMass, kept_mass
-from workbench.diagnosis.command_or_pressure import ByCommand, by_command
+from workbench.diagnosis.doubt import Case, Doubt
+from workbench.diagnosis.doubts import doubts_about
 from workbench.diagnosis.error_before_fit import AsGiven
-from workbench.diagnosis.imitating_effect import StandIn, stand_in
 from workbench.diagnosis.judged_landings import judged_landings
-from workbench.diagnosis.measured_pressure import ByMeasuredPressure, by_measured_pressure
-from workbench.diagnosis.moved_parameters import Moved, moved_parameters
 from workbench.diagnosis.positioner_or_packing import PositionerOrPacking, positioner_or_packing
-from workbench.diagnosis.pressure_scale import PressureScale, pressure_scale
-from workbench.diagnosis.verdict import EXPLAINED, Verdict, by_another_name, verdict
+from workbench.diagnosis.pressure_scale import PressureScale
+from workbench.diagnosis.verdict import Verdict, by_another_name, verdict
 from workbench.diagnosis.verdict_sentence import floor_by_pressure, verdict_line, verdict_sentence
 from workbench.fit.breaking_off import BrokenOff, ending
 from workbench.fit.fit_result import Fit
@@ -45,6 +42,7 @@ from workbench.select.tangent_preview import TangentScore, preview
 if TYPE_CHECKING:
     from matplotlib.figure import Figure
 
+DoubtT = TypeVar("DoubtT", bound=Doubt)
 BEFORE_IT = "acts before the measured pressure, which drives the stem"
 
 
@@ -65,18 +63,8 @@ class Diagnosis(Result, ForwardSelection[EvaluatedModel, EffectCandidate]):
     """Effects that were not tried, and why a recording sampled like this one cannot show them."""
     positioner: PositionerOrPacking | None = None
     """Of a recording of set point and travel: what holds the stem."""
-    moved: tuple[Moved, ...] = ()
-    """Parameters of the file's own effects that the recording wants elsewhere."""
-    kept_mass: KeptMass | None = None
-    """Another mass than the file's, beside which less is left."""
-    by_pressure: ByMeasuredPressure | None = None
-    """What the best model is from the measured pressure on, where its own is another."""
-    by_command: ByCommand | None = None
-    """What the best model is by the command, where that is a better witness than the pressure that drives the stem."""
-    pressure_scale: PressureScale | None = None
-    """How the measured pressure stands to its command, where it drives the stem, or says another, and is not that."""
-    stand_in: StandIn | None = None
-    """A form without a name that does better than what was named, which is then no explanation."""
+    doubts: tuple[Doubt, ...] = ()
+    """What speaks against it as it stands."""
 
     @property
     def kind(self) -> Kind:
@@ -91,15 +79,17 @@ class Diagnosis(Result, ForwardSelection[EvaluatedModel, EffectCandidate]):
     @property
     def nothing_off(self) -> bool:
         """Whether the valve file holds as it is: no effect is missing, and nothing in it is off."""
-        off = self.moved or self.kept_mass or self.by_pressure or self.pressure_scale or by_another_name(self.steps)
-        return self.verdict == "adequate" and not off
+        return self.verdict == "adequate" and not self.doubts and not by_another_name(self.steps)
 
     @property
     def sure(self) -> bool:
         """Whether what is missing, or which parameters are off, is known, by forces that are the valve's."""
-        return (self.verdict == "missing" or self.parameters_off) and not (
-            self.pressure_scale and self.best.fit.from_pressure
-        )
+        another_scale = self.best.fit.from_pressure and self.doubt(PressureScale)
+        return (self.verdict == "missing" or self.parameters_off) and not another_scale
+
+    def doubt(self, kind: type[DoubtT]) -> DoubtT | None:
+        """Return the doubt of a kind; None if there is none."""
+        return next((each for each in self.doubts if isinstance(each, kind)), None)
 
     @property
     def suspected(self) -> tuple[str, ...]:
@@ -242,6 +232,7 @@ def diagnose(
     with ending(over or (lambda: False)):
         base = search.base(valve)
         parts = search.split
+        given = AsGiven.of(valve, parts, base.fit)
         scores: tuple[TangentScore, ...] = ()
         held = None
         try:
@@ -254,20 +245,25 @@ def diagnose(
             if on_preview:
                 on_preview(scores)
             steps = search.steps(base)
-            base, best = steps[0].before, _last(steps)
+            best = _last(steps)
             landed = judged_landings(best.fit, parts)
-            found = verdict(best, steps, parts.motion_std_m, parts.floor_m, landed, parts.early)
-            asked = _asked(found, best, steps, valve, library, parts, workers=threads, tell=tell)
-            found = "unexplained" if asked.stand_in else found
+            case = Case(
+                verdict=verdict(best, steps, parts.motion_std_m, parts.floor_m, landed, parts.early),
+                best=best,
+                steps=steps,
+                valve=valve,
+                library=library,
+                parts=parts,
+                given=given,
+                workers=threads,
+                progress=tell,
+            )
+            doubts = doubts_about(case)
+            found = "unexplained" if any(each.overturns for each in doubts) else case.verdict
             chosen = search.experiment(steps) if found == "one_of" else None
         except (BrokenOff, KeyboardInterrupt):
-            steps, found, chosen, asked = search.so_far(base), "unfinished", None, Asked()
-            base, best = steps[0].before, _last(steps)
-    own = {each.name: find_effect(each.name, "effects") for each in valve.effect}
-    given = AsGiven.of(valve, parts, base.fit)
-    moved = (
-        moved_parameters(valve, best.fit, library | own) if found in EXPLAINED and not given.holds(best.errors) else ()
-    )
+            steps, found, chosen, doubts = search.so_far(base), "unfinished", None, ()
+            best = _last(steps)
     return Diagnosis(
         steps=steps,
         verdict=found,
@@ -277,63 +273,12 @@ def diagnose(
         experiment=chosen,
         split=parts,
         given=given,
-        sentence=(f"{_capital(asked.kept_mass.sentence)}. " if asked.kept_mass else "")
-        + verdict_sentence(found, best, steps, library, parts, given)
-        + (f" {asked.stand_in.sentence}." if asked.stand_in else "")
-        + "".join(f" But {each.sentence(best.fit.kind)}." for each in moved)
-        + (f" But {asked.by_pressure.sentence(best.fit.kind)}." if asked.by_pressure else "")
-        + (f" But {asked.scale.sentence(best.fit.kind)}." if asked.scale else "")
-        + (f" But {asked.by_command.sentence(best.fit.kind)}." if asked.by_command else ""),
+        sentence=verdict_sentence(found, best, steps, library, parts, given)
+        + "".join(f" But {each.sentence(best.fit.kind)}." for each in doubts),
         unseen=unseen,
         positioner=held,
-        moved=moved,
-        kept_mass=asked.kept_mass,
-        by_pressure=asked.by_pressure,
-        by_command=asked.by_command,
-        pressure_scale=asked.scale,
-        stand_in=asked.stand_in,
+        doubts=doubts,
     )
-
-
-def _capital(sentence: str) -> str:
-    return sentence[0].upper() + sentence[1:]
-
-
-class Asked(NamedTuple):
-    """What the best model is asked before it is believed; None where there is nothing to say."""
-
-    kept_mass: KeptMass | None = None
-    by_pressure: ByMeasuredPressure | None = None
-    stand_in: StandIn | None = None
-    by_command: ByCommand | None = None
-    scale: PressureScale | None = None
-
-
-def _asked(
-    found: Verdict,
-    best: EvaluatedModel,
-    steps: Sequence[EffectStep],
-    valve: ValveFile,
-    library: Mapping[str, Effect],
-    parts: Split,
-    *,
-    workers: int,
-    tell: Progress,
-) -> Asked:
-    """Ask the best model for its mass, its pressure, and, where neither is another, whether it only stands in."""
-    if parts.early:
-        return Asked()
-    scale = pressure_scale(parts.train.record)
-    if scale and best.fit.from_pressure:
-        return Asked(scale=scale)
-    if commanded := by_command(best, parts, workers=workers, progress=tell):
-        return Asked(by_command=commanded)
-    mass = kept_mass(best, parts, tell)
-    pressed = by_measured_pressure(best, parts, workers=workers, progress=tell)
-    if found not in EXPLAINED or mass or pressed:
-        return Asked(mass, scale=scale) if pressed and scale else Asked(mass, pressed)
-    outdone = stand_in(best, steps, valve, library, parts, workers=workers, progress=tell)
-    return Asked(stand_in=outdone)
 
 
 def _last(steps: Sequence[EffectStep]) -> EvaluatedModel:

@@ -4,14 +4,30 @@
 more than a factor of 2 in it, so it never exceeds 0.5.
 """
 
+from collections.abc import Mapping
 from typing import Any
 
+from workbench.diagnosis.command_or_pressure import ByCommand
 from workbench.diagnosis.diagnosis import Diagnosis
+from workbench.diagnosis.doubt import Doubt
+from workbench.diagnosis.imitating_effect import StandIn
+from workbench.diagnosis.kept_mass import KeptMass
+from workbench.diagnosis.measured_pressure import ByMeasuredPressure
+from workbench.diagnosis.moved_parameters import MovedParameters
+from workbench.diagnosis.pressure_scale import PressureScale
 from workbench.fit.fitted_parameter import parameters_json
-from workbench.select.block_errors import errors_json
 from workbench.select.candidate_table import candidate_json
-from workbench.select.effect_candidates import EffectCandidate, EvaluatedModel
+from workbench.select.effect_candidates import EffectCandidate, model_json
 from workbench.select.equivalence import undetectable
+
+KEYS: Mapping[type[Doubt], str] = {
+    MovedParameters: "moved",
+    KeptMass: "kept_mass",
+    ByMeasuredPressure: "by_pressure",
+    ByCommand: "by_command",
+    PressureScale: "pressure_scale",
+    StandIn: "stand_in",
+}
 
 
 def as_json(diagnosis: Diagnosis) -> dict[str, Any]:
@@ -28,38 +44,14 @@ def as_json(diagnosis: Diagnosis) -> dict[str, Any]:
         "indistinguishable": [list(names) for names in diagnosis.indistinguishable],
         "suspected": list(diagnosis.suspected),
         "contradicted": list(diagnosis.contradicted),
-        "moved": [
-            {
-                "name": each.name,
-                "before": each.before,
-                "value": each.fitted.value,
-                "lower": each.fitted.lower,
-                "upper": each.fitted.upper,
-                "like": list(each.like),
-            }
-            for each in diagnosis.moved
-        ],
-        "kept_mass": diagnosis.kept_mass
-        and {
-            "kept_kg": diagnosis.kept_mass.kept_kg,
-            "fitted_kg": diagnosis.kept_mass.fitted_kg,
-            "kept_test_rmse_m": diagnosis.kept_mass.kept_rmse_m,
-            "fitted_test_rmse_m": diagnosis.kept_mass.fitted_rmse_m,
-        },
-        "by_pressure": diagnosis.by_pressure
-        and {"off_pa": diagnosis.by_pressure.off_pa, **_model(diagnosis.by_pressure.model)},
-        "by_command": diagnosis.by_command and _model(diagnosis.by_command.model),
-        "pressure_scale": diagnosis.pressure_scale
-        and {"span": diagnosis.pressure_scale.span, "above_pa": diagnosis.pressure_scale.above_pa},
-        "stand_in": diagnosis.stand_in
-        and {"form": diagnosis.stand_in.form, "test_rmse_m": diagnosis.stand_in.form_rmse_m},
+        **_doubts(diagnosis),
         "parameters_off": diagnosis.parameters_off,
         "given": {
             "train_rmse_m": diagnosis.given.errors.train_rmse_m,
             "test_rmse_m": diagnosis.given.errors.test_rmse_m,
         },
-        "base": _model(diagnosis.base),
-        "best": _model(diagnosis.best),
+        "base": model_json(diagnosis.base),
+        "best": model_json(diagnosis.best),
         "floor_m": diagnosis.split.floor_m,
         "preview": [{"name": each.name, "score": each.score} for each in diagnosis.preview],
         "untold": [
@@ -70,15 +62,9 @@ def as_json(diagnosis: Diagnosis) -> dict[str, Any]:
     }
 
 
-def _model(model: EvaluatedModel) -> dict[str, Any]:
-    return {
-        "effects": list(model.effects),
-        **errors_json(model.errors),
-        "at_floor": model.at_floor,
-        "structure_r2": model.errors.structure,
-        "pressure_off_pa": model.pressure.rms_pa if model.pressure else None,
-        "parameters": parameters_json(model.fit.parameters),
-    }
+def _doubts(diagnosis: Diagnosis) -> dict[str, Any]:
+    found = {KEYS[type(each)]: each.as_json() for each in diagnosis.doubts}
+    return {key: found.get(key) for key in KEYS.values()} | {"moved": found.get("moved", [])}
 
 
 def _candidate(candidate: EffectCandidate) -> dict[str, Any]:

@@ -13,25 +13,26 @@ forms of its kind, which come near, too, would leave no room among the likeliest
 that does better than several effects together makes stand-ins of them, wherever it acts.
 """
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Mapping
 from dataclasses import dataclass
+from typing import Any, ClassVar
 
-from config.drive import Scale
-from config.results.result import Brief
-from config.valve_file import ValveFile
+from config.drive import Kind
 from sim.effect import Effect
 from workbench.data.held_out import Split
-from workbench.diagnosis.assumed_mass import leaves_something
+from workbench.diagnosis.doubt import Case, Doubt
+from workbench.diagnosis.kept_mass import leaves_something
 from workbench.discover.form_search import FIRST_TURN_FORMS, search_forms
 from workbench.select.block_errors import AT_FLOOR, NOISE_KNOWN_TO
-from workbench.select.effect_candidates import EffectStep, EvaluatedModel, outdoes
-from workbench.select.effect_search import Progress
+from workbench.select.effect_candidates import EvaluatedModel, outdoes
 from workbench.select.equivalence import algebraic_class
 
 
 @dataclass(frozen=True, slots=True, repr=False)
-class StandIn(Brief):
+class StandIn(Doubt):
     """What was named, and the form that does better."""
+
+    overturns: ClassVar[bool] = True
 
     named: tuple[str, ...]
     form: str
@@ -40,44 +41,30 @@ class StandIn(Brief):
     named_rmse_m: float
     """Held out, with what was named."""
     form_rmse_m: float
-    length: Scale
-    """As it is read."""
 
-    @property
-    def sentence(self) -> str:
-        """Say so, in one sentence."""
+    def sentence(self, kind: Kind) -> str:
+        """Say so."""
         imitate = "imitates" if len(self.named) == 1 else "imitate"
         return (
-            f"A form without a name does better: {self.words}, alone, leaves {self.length.number(self.form_rmse_m)} "
-            f"held out in place of {self.length.said(self.named_rmse_m)}. So {' and '.join(self.named)} only {imitate} "
+            f"a form without a name does better: {self.words}, alone, leaves {kind.length.number(self.form_rmse_m)} "
+            f"held out in place of {kind.length.said(self.named_rmse_m)}. So {' and '.join(self.named)} only {imitate} "
             "it; `positioner discover` writes it"
         )
 
+    def as_json(self) -> dict[str, Any]:
+        """Return it in plain types."""
+        return {"form": self.form, "test_rmse_m": self.form_rmse_m}
 
-def stand_in(
-    best: EvaluatedModel,
-    steps: Sequence[EffectStep],
-    valve: ValveFile,
-    library: Mapping[str, Effect],
-    parts: Split,
-    *,
-    workers: int,
-    progress: Progress,
-) -> StandIn | None:
+
+def imitating_effect(case: Case) -> StandIn | None:
     """Return what does better than what was named; None where nothing does, or nothing is left of the record.
 
     Nor is it asked behind a positioner, or where samples lie farther apart than slides last.
-
-    Args:
-        best: the model with what was named.
-        steps: to it.
-        valve: as it was diagnosed.
-        library: what was tried.
-        parts: of the record, fitted and held out.
-        workers: threads.
-        progress: called with what is under way, and the fraction done.
     """
-    added = [step for step in steps if step.added]
+    if case.doubts or not case.explained:
+        return None
+    best, parts, library = case.best, case.parts, case.library
+    added = [step for step in case.steps if step.added]
     left = leaves_something(best) or _lands_elsewhere(best, parts)
     if not added or not left or best.fit.by.slow or parts.train.record.by_setpoint:
         return None
@@ -86,18 +73,18 @@ def stand_in(
     places = {place for name in (*named, *rivals) for place in _places(name, library)} if len(named) == 1 else set()
     found = search_forms(
         parts,
-        valve,
-        steps[0].before,
+        case.valve,
+        case.steps[0].before,
         most=FIRST_TURN_FORMS,
-        workers=workers,
-        progress=progress,
+        workers=case.workers,
+        progress=case.progress,
         elsewhere_than=places,
     ).found
     better = [each for each in found if outdoes(each.model, best)]
     if not better:
         return None
     form, errors = better[0].form, better[0].model.errors
-    return StandIn(named, form.name, form.words, best.errors.test_rmse_m, errors.test_rmse_m, best.fit.kind.length)
+    return StandIn(named, form.name, form.words, best.errors.test_rmse_m, errors.test_rmse_m)
 
 
 def _lands_elsewhere(best: EvaluatedModel, parts: Split) -> bool:

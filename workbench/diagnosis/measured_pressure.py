@@ -11,13 +11,14 @@ does. But it moves no stem: where the stem follows the command better, that is s
 """
 
 from dataclasses import dataclass
+from typing import Any
 
 from config.drive import Kind
-from config.results.result import Brief
-from workbench.data.held_out import Split
+from workbench.diagnosis.doubt import Case, Doubt
+from workbench.diagnosis.pressure_scale import PressureScale, pressure_scale
 from workbench.fit.fitting import fit
-from workbench.select.effect_candidates import EvaluatedModel, outdoes
-from workbench.select.effect_search import Progress, evaluated
+from workbench.select.effect_candidates import EvaluatedModel, model_json, outdoes
+from workbench.select.effect_search import evaluated
 
 MATTERS = 0.03
 """Of the friction."""
@@ -26,7 +27,7 @@ ANOTHER = 0.02
 
 
 @dataclass(frozen=True, slots=True, repr=False)
-class ByMeasuredPressure(Brief):
+class ByMeasuredPressure(Doubt):
     """A model whose pressure is off the measured one, and what it is from that one on."""
 
     off_pa: float
@@ -52,6 +53,10 @@ class ByMeasuredPressure(Brief):
             f"{self._doubt(kind)}"
         )
 
+    def as_json(self) -> dict[str, Any]:
+        """Return it in plain types, with the model from the measured pressure on."""
+        return {"off_pa": self.off_pa, **model_json(self.model)}
+
     def _doubt(self, kind: Kind) -> str:
         if not self.worse:
             return ""
@@ -61,26 +66,22 @@ class ByMeasuredPressure(Brief):
         )
 
 
-def by_measured_pressure(
-    best: EvaluatedModel, parts: Split, *, workers: int, progress: Progress
-) -> ByMeasuredPressure | None:
+def by_measured_pressure(case: Case) -> ByMeasuredPressure | PressureScale | None:
     """Return what the best model is from the measured pressure on; None where its own pressure is that one.
 
-    Nor is it asked behind a positioner, whose set point is no pressure (`positioner_or_packing`).
-
-    Args:
-        best: what was found from the command on.
-        parts: of the record, fitted and held out.
-        workers: threads.
-        progress: called with what is under way, and the fraction done.
+    Where that pressure is on another scale than the command, that is said in its place. Nor is it asked behind a
+    positioner, whose set point is no pressure (`positioner_or_packing`).
     """
-    if best.pressure is None or parts.train.record.by_setpoint:
+    best, record = case.best, case.parts.train.record
+    if best.pressure is None or record.by_setpoint:
         return None
     valve, off_pa = best.fit.valve.valve, best.pressure.structured_pa
     of_friction = valve.diaphragm_area_m2 * off_pa / valve.coulomb_n if valve.coulomb_n else 0.0
     if of_friction <= MATTERS:
         return None
-    model = driven_otherwise(best, parts, workers=workers, progress=progress)
+    if scale := pressure_scale(record):
+        return scale
+    model = driven_otherwise(case)
     others = tuple(
         (name, before.value, after.value)
         for name, after in model.fit.parameters.items()
@@ -89,15 +90,15 @@ def by_measured_pressure(
     return ByMeasuredPressure(off_pa, of_friction, model, others, best.errors.test_rmse_m, outdoes(best, model))
 
 
-def driven_otherwise(best: EvaluatedModel, parts: Split, *, workers: int, progress: Progress) -> EvaluatedModel:
-    """Return a model fitted once more, by the command if it was by the measured pressure, and the other way round."""
-    by_pressure = not best.fit.from_pressure
+def driven_otherwise(case: Case) -> EvaluatedModel:
+    """Return the best model fitted once more, by the command if it was by the measured pressure, or the other way."""
+    best, parts, by_pressure = case.best, case.parts, not case.best.fit.from_pressure
     what = f"fitting {'from the measured pressure' if by_pressure else 'by the command'}"
     found = fit(
         parts.train.recording,
         best.fit.valve,
-        workers=workers,
+        workers=case.workers,
         from_pressure=by_pressure,
-        progress=lambda done: progress(what, done),
+        progress=lambda done: case.progress(what, done),
     )
     return evaluated(found, parts)

@@ -7,10 +7,12 @@ in for, by their files' `CONFOUNDED`. What a positioner is set to is a guess to 
 
 from collections.abc import Mapping
 from dataclasses import dataclass
+from typing import Any
 
 from config.drive import Kind
 from config.valve_file import ValveFile
-from sim.effect import Effect
+from sim.effect import Effect, find_effect
+from workbench.diagnosis.doubt import Case, Doubt
 from workbench.fit.fit_result import Fit
 from workbench.fit.fitted_parameter import Fitted
 from workbench.select.equivalence import algebraic_class, distinguishing_record
@@ -38,7 +40,41 @@ class Moved:
         )
 
 
-def moved_parameters(file: ValveFile, fit: Fit, library: Mapping[str, Effect]) -> tuple[Moved, ...]:
+@dataclass(frozen=True, slots=True, repr=False)
+class MovedParameters(Doubt):
+    """All of them."""
+
+    moved: tuple[Moved, ...]
+
+    def sentence(self, kind: Kind) -> str:
+        """Say so."""
+        return ". But ".join(each.sentence(kind) for each in self.moved)
+
+    def as_json(self) -> list[dict[str, Any]]:
+        """Return them in plain types."""
+        return [
+            {
+                "name": each.name,
+                "before": each.before,
+                "value": each.fitted.value,
+                "lower": each.fitted.lower,
+                "upper": each.fitted.upper,
+                "like": list(each.like),
+            }
+            for each in self.moved
+        ]
+
+
+def moved_parameters(case: Case) -> MovedParameters | None:
+    """Return the parameters of the file's own effects that the recording wants elsewhere; None where it holds."""
+    if not case.explained or case.given.holds(case.best.errors):
+        return None
+    own = {each.name: find_effect(each.name, "effects") for each in case.valve.effect}
+    moved = excluded_parameters(case.valve, case.best.fit, {**case.library, **own})
+    return MovedParameters(moved) if moved else None
+
+
+def excluded_parameters(file: ValveFile, fit: Fit, library: Mapping[str, Effect]) -> tuple[Moved, ...]:
     """Return the parameters of a file's effects whose value the fit excludes.
 
     Args:

@@ -9,14 +9,15 @@ does not follow the command, as |e| of a third of its own changes shows, there i
 
 from dataclasses import dataclass
 from itertools import permutations
+from typing import Any
 
 import numpy as np
 
 from config.drive import Kind
 from config.recording import Column
-from config.results.result import Brief
 from workbench.data.pressure_lag import command_followed_pa
 from workbench.data.record import UNITS_PA, Record
+from workbench.diagnosis.doubt import Case, Doubt
 
 SPAN_OFF, ZERO_OFF, FOLLOWS = 1.25, 0.2, 1.0 / 3.0
 LAGS = np.geomspace(1e-2, 1e3, 41)
@@ -29,7 +30,7 @@ ATMOSPHERE_PA = 101325.0
 
 
 @dataclass(frozen=True, slots=True, repr=False)
-class PressureScale(Brief):
+class PressureScale(Doubt):
     """How a measured pressure stands to its command, where that is not one to one."""
 
     span: float
@@ -48,6 +49,15 @@ class PressureScale(Brief):
             f"the measured {kind.command.word} is {way} the command{by}{read or zero}, so forces fitted by it are "
             "wrong; correct its unit, zero or line, or diagnose by the command"
         )
+
+    def as_json(self) -> dict[str, Any]:
+        """Return it in plain types."""
+        return {"span": self.span, "above_pa": self.above_pa}
+
+
+def driven_at_another_scale(case: Case) -> PressureScale | None:
+    """Return how the measured pressure that drives the stem stands to its command; None where the command does."""
+    return pressure_scale(case.parts.train.record) if case.best.fit.from_pressure else None
 
 
 def pressure_scale(record: Record) -> PressureScale | None:

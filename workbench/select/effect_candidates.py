@@ -5,12 +5,14 @@ Pure functions of fits and errors: nothing is simulated here.
 
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
+from typing import Any
 
 from config.results.result import Brief
 from config.valve_file import ValveParameters
 from sim.effect import Effect, Parameter
 from workbench.fit.fit_result import Fit
-from workbench.select.block_errors import AT_FLOOR, BlockErrors
+from workbench.fit.fitted_parameter import parameters_json
+from workbench.select.block_errors import AT_FLOOR, BlockErrors, errors_json
 from workbench.select.candidate_table import Tried
 from workbench.select.effect_acceptance import LEAST_BIC, OVERWHELMING_BIC, Gain, gain, no_better
 from workbench.select.equivalence import algebraic_class, bare_parameter, classes
@@ -100,6 +102,18 @@ class EffectCandidate(Candidate):
         errors = self.model.errors
         rms_m = (errors.train_rmse_m, errors.test_rmse_m, errors.test_block_m)
         return Tried(self.step, self.name, *rms_m, self.gain, self.rejection_reason)
+
+
+def model_json(model: EvaluatedModel) -> dict[str, Any]:
+    """Return a model in plain types; SI units, in the names."""
+    return {
+        "effects": list(model.effects),
+        **errors_json(model.errors),
+        "at_floor": model.at_floor,
+        "structure_r2": model.errors.structure,
+        "pressure_off_pa": model.pressure.rms_pa if model.pressure else None,
+        "parameters": parameters_json(model.fit.parameters),
+    }
 
 
 EffectStep = ForwardStep[EvaluatedModel, EffectCandidate]

@@ -7,15 +7,15 @@ gone with it: of what the valve scatters a mass imitates some.
 """
 
 from dataclasses import dataclass
+from typing import Any
 
-from config.drive import Scale
-from config.results.result import Brief
-from workbench.data.held_out import Split
+from config.drive import Kind
+from workbench.diagnosis.doubt import Case, Doubt
 from workbench.fit.fitting import base_fit, problem_of
 from workbench.select.block_errors import NOISE_KNOWN_TO, BlockErrors
 from workbench.select.effect_acceptance import gain
 from workbench.select.effect_candidates import EvaluatedModel
-from workbench.select.effect_search import Progress, evaluated
+from workbench.select.effect_search import evaluated
 
 MASS = "mass_kg"
 BEGINS = (1.0, 0.2)
@@ -27,7 +27,7 @@ MOST_LEFT = 0.5
 
 
 @dataclass(frozen=True, slots=True, repr=False)
-class KeptMass(Brief):
+class KeptMass(Doubt):
     """A mass beside which the best model of a diagnosis leaves less."""
 
     kept_kg: float
@@ -35,38 +35,40 @@ class KeptMass(Brief):
     kept_rmse_m: float
     """Held out, with the mass as the valve file says."""
     fitted_rmse_m: float
-    length: Scale
-    """As it is read."""
 
-    @property
-    def sentence(self) -> str:
-        """What to do about it, in one sentence."""
+    def sentence(self, kind: Kind) -> str:
+        """Say so, and what to do."""
         return (
             f"the mass in the valve file, {self.kept_kg:.3g} kg, is not fitted; with {self.fitted_kg:.3g} kg the "
-            f"held-out error would be {self.length.number(self.fitted_rmse_m)} in place of "
-            f"{self.length.said(self.kept_rmse_m)}. Weigh plate, stem and plug, or put this mass_kg into the file, and "
+            f"held-out error would be {kind.length.number(self.fitted_rmse_m)} in place of "
+            f"{kind.length.said(self.kept_rmse_m)}. Weigh plate, stem and plug, or put this mass_kg into the file, and "
             "diagnose again"
         )
 
+    def as_json(self) -> dict[str, Any]:
+        """Return it in plain types."""
+        return {
+            "kept_kg": self.kept_kg,
+            "fitted_kg": self.fitted_kg,
+            "kept_test_rmse_m": self.kept_rmse_m,
+            "fitted_test_rmse_m": self.fitted_rmse_m,
+        }
 
-def kept_mass(best: EvaluatedModel, parts: Split, progress: Progress) -> KeptMass | None:
+
+def kept_mass(case: Case) -> KeptMass | None:
     """Return which mass leaves less than the valve file's; None where none does, or nothing is left of the record.
 
     Nor is it asked where samples lie farther apart than slides last: there no mass shows.
-
-    Args:
-        best: what was found with the mass as it is.
-        parts: of the record, fitted and held out.
-        progress: called with what is under way, and the fraction done.
     """
+    best, parts = case.best, case.parts
     before = best.fit
-    if not leaves_something(best) or before.by.slow or MASS in before.parameters:
+    if case.doubts or not leaves_something(best) or before.by.slow or MASS in before.parameters:
         return None
     kept_kg = before.valve.valve.mass_kg
     free = [*before.parameters, MASS]
     models: list[EvaluatedModel] = []
     for number, share in enumerate(BEGINS):
-        progress("fitting the mass, too", number / len(BEGINS))
+        case.progress("fitting the mass, too", number / len(BEGINS))
         valve = before.valve.valve.model_copy(update={MASS: share * kept_kg})
         begin = before.valve.model_copy(update={"valve": valve})
         found = base_fit(problem_of(before, parts.train.record), begin, free=free)
@@ -77,7 +79,7 @@ def kept_mass(best: EvaluatedModel, parts: Split, progress: Progress) -> KeptMas
     if not explains_most(best.errors, model.errors, best.floor_m):
         return None
     fitted_kg = model.fit.valve.valve.mass_kg
-    return KeptMass(kept_kg, fitted_kg, best.errors.test_rmse_m, model.errors.test_rmse_m, before.kind.length)
+    return KeptMass(kept_kg, fitted_kg, best.errors.test_rmse_m, model.errors.test_rmse_m)
 
 
 def explains_most(before: BlockErrors, after: BlockErrors, floor_m: float | None) -> bool:

@@ -6,8 +6,8 @@ import pytest
 from tests.workbench.hand_made import AT_FLOOR, FLOOR_M, model_of
 from tests.workbench.valves import drawn_valve, record_of
 from workbench.blind.input_signal import excitation
-from workbench.diagnosis.assumed_mass import explains_most, leaves_something
 from workbench.diagnosis.diagnosis import diagnose
+from workbench.diagnosis.kept_mass import KeptMass, explains_most, leaves_something
 
 LIGHT_KG = 1.4
 
@@ -33,11 +33,11 @@ def test_a_mass_that_hides_what_the_recording_shows_is_named() -> None:
     recording = record_of(valve, 5, command_pa=excitation(valve.valve, np.random.default_rng(5), 1000))
     heavy = valve.model_copy(update={"valve": valve.valve.model_copy(update={"mass_kg": 8.0})})
     diagnosis = diagnose(recording, heavy, effects=("backlash",))
-    found = diagnosis.kept_mass
+    found = diagnosis.doubt(KeptMass)
     assert found is not None
     assert not diagnosis.nothing_off
-    assert found.sentence.lower() in diagnosis.sentence.lower()
+    assert found.sentence(diagnosis.kind) in diagnosis.sentence
     assert abs(found.fitted_kg - LIGHT_KG) < 0.3 * LIGHT_KG
     assert found.fitted_rmse_m < 0.5 * found.kept_rmse_m
     assert found.kept_kg == 8.0
-    assert diagnose(recording, valve, effects=("backlash",)).kept_mass is None
+    assert diagnose(recording, valve, effects=("backlash",)).doubts == ()
