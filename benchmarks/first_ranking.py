@@ -16,8 +16,8 @@ import numpy as np
 from sim.effect import Effect, first_effects, shipped_effect
 from workbench.blind.hiding import hide
 from workbench.data.held_out import split
+from workbench.fit.fit_problem import problem
 from workbench.fit.fitting import base_fit
-from workbench.fit.problem import problem
 from workbench.select.equivalence import algebraic_class
 from workbench.select.tangent_preview import preview
 

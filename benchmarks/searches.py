@@ -40,8 +40,8 @@ from sim.effect import first_effects
 from workbench.blind.hiding import draw_effects, hide
 from workbench.data.record import ready
 from workbench.data.stretches import informative
+from workbench.fit.fit_problem import problem
 from workbench.fit.fitting import base_fit, fit
-from workbench.fit.problem import problem
 
 Kind = Literal["full", "poor"]
 FIRST_SEED = 52000

@@ -21,8 +21,8 @@ from workbench.compare.comparison import compare
 from workbench.data.held_out import split
 from workbench.data.record import Record
 from workbench.diagnosis.diagnosis import diagnose
+from workbench.fit.fit_problem import problem
 from workbench.fit.fitting import base_fit
-from workbench.fit.problem import problem
 from workbench.model.free_run import FINE, Accuracy, FreeRun
 from workbench.select.tangent_preview import preview
 

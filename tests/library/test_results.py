@@ -175,7 +175,7 @@ def test_the_command_prints_the_summary(hidden: pos.Hidden, tmp_path: Path, caps
 
 
 def test_a_parameter_that_means_nothing_is_said_to() -> None:
-    from workbench.fit.fitted_parameter import Fitted, parameter_table
+    from workbench.fit.parameter_estimate import Fitted, parameter_table
 
     parameters = {
         "free": Fitted(1.0, 0.1, 0.8, 1.2, at_bound=False, physical=True),

@@ -12,7 +12,7 @@ from config.valve_file import EffectTable, ValveFile
 from sim.effect import shipped_effect, shipped_effects
 from tests.workbench.valves import SEED
 from workbench.fit.fit_result import NOTHING, Fit, Term, Terms
-from workbench.fit.fitted_parameter import Fitted
+from workbench.fit.parameter_estimate import Fitted
 from workbench.select.block_errors import BlockErrors
 from workbench.select.effect_candidates import EvaluatedModel
 

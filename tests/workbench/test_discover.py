@@ -29,8 +29,8 @@ from workbench.discover.discovery import discover
 from workbench.discover.form_file import form_text, write_forms
 from workbench.discover.form_proposal import propose_forms
 from workbench.discover.grammar import FORMS, Form
+from workbench.fit.fit_problem import problem
 from workbench.fit.fitting import base_fit
-from workbench.fit.problem import problem
 
 SPRING = Path(__file__).parents[2] / "benchmarks" / "outside" / "second_spring.py"
 BARE = drawn_valve(np.random.default_rng(11))

@@ -16,9 +16,9 @@ from tests.workbench.valves import SEED, record_of
 from workbench.data.held_out import join_recordings, residual_m, split
 from workbench.data.record import ready
 from workbench.diagnosis.verdict_sentence import reduction_sentence
+from workbench.fit.fit_problem import problem
 from workbench.fit.fit_result import Known, Term
 from workbench.fit.fitting import base_fit
-from workbench.fit.problem import problem
 from workbench.model.search_coordinates import Parameter
 from workbench.model.told_run import told_moves
 from workbench.select.block_errors import block_errors, block_logs, indistinguishable, relative_error_reduction

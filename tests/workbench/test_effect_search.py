@@ -16,11 +16,11 @@ from sim.effect import Effect
 from tests.workbench.hand_made import AT_FLOOR, FLOOR_M, LIBRARY, errors_of, fit_of, model_of, terms_of, valve_with
 from workbench.data.held_out import Split, split
 from workbench.fit.breaking_off import BrokenOff
+from workbench.fit.fit_problem import Problem
 from workbench.fit.fit_result import Fit, Terms
 from workbench.fit.fitting import Trial
 from workbench.fit.likelihood import Likelihood
 from workbench.fit.minimiser import End
-from workbench.fit.problem import Problem
 from workbench.model.simulation_regime import DYNAMIC
 from workbench.select import effect_search
 from workbench.select.effect_candidates import EffectStep, EvaluatedModel, judged_step

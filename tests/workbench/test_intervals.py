@@ -14,11 +14,11 @@ from tests.workbench.valves import SLIM, record_of
 from workbench.blind.hiding import hide
 from workbench.data.record import ready
 from workbench.fit.ends import search_about
+from workbench.fit.fit_problem import problem
 from workbench.fit.fit_result import Counted, terms
 from workbench.fit.fitting import fit
 from workbench.fit.likelihood import Groups, Likelihood, soft
 from workbench.fit.minimiser import Effort, End, derivatives, descend
-from workbench.fit.problem import problem
 from workbench.fit.uncertainty import RISE_95, uncertainty
 
 DRAWS = 100

@@ -11,11 +11,11 @@ from sim.composition import COULOMB, STATIC, Composition
 from tests.simulated import simulated
 from tests.workbench.valves import NOISE_M, SEED, record_of, with_effect
 from workbench.data.record import Record, ready
+from workbench.fit.fit_problem import problem
 from workbench.fit.fitting import fit
 from workbench.fit.likelihood import Likelihood, layout, soft, soft_weight
 from workbench.fit.minimiser import WHOLE, Ground, Place, minimise
 from workbench.fit.onsets import with_onsets
-from workbench.fit.problem import problem
 from workbench.model.free_run import FreeRun
 from workbench.model.told_run import ToldRun, told_moves
 

@@ -10,8 +10,8 @@ from tests.workbench.valves import SEED, drawn_valve, record_of, with_effect
 from workbench.data.held_out import split
 from workbench.diagnosis.error_before_fit import AsGiven
 from workbench.diagnosis.moved_parameters import Moved, excluded_parameters
-from workbench.fit.fitted_parameter import Fitted
 from workbench.fit.fitting import fit
+from workbench.fit.parameter_estimate import Fitted
 from workbench.select.block_errors import block_errors
 
 

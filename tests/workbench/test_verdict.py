@@ -17,7 +17,7 @@ from workbench.diagnosis.judged_landings import JudgedLandings
 from workbench.diagnosis.verdict import verdict
 from workbench.diagnosis.verdict_sentence import BREAKS_ELSEWHERE, REPEAT, rivals_sentence, verdict_sentence
 from workbench.fit.fit_result import Term
-from workbench.fit.fitted_parameter import Fitted
+from workbench.fit.parameter_estimate import Fitted
 from workbench.model.simulation_regime import Motion, Sampling
 from workbench.select.effect_candidates import EffectStep, EvaluatedModel, judged_step
 

@@ -15,7 +15,7 @@ from workbench.diagnosis.kept_mass import KeptMass
 from workbench.diagnosis.measured_pressure import ByMeasuredPressure
 from workbench.diagnosis.moved_parameters import MovedParameters
 from workbench.diagnosis.pressure_scale import PressureScale
-from workbench.fit.fitted_parameter import parameters_json
+from workbench.fit.parameter_estimate import parameters_json
 from workbench.select.candidate_table import candidate_json
 from workbench.select.effect_candidates import EffectCandidate, model_json
 from workbench.select.equivalence import undetectable

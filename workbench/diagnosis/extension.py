@@ -21,8 +21,8 @@ from workbench.diagnosis.diagnosis import Diagnosis
 from workbench.diagnosis.error_before_fit import AsGiven
 from workbench.diagnosis.pressure_scale import pressure_scale
 from workbench.fit.fit_result import Fit
-from workbench.fit.fitted_parameter import parameter_table
 from workbench.fit.fitting import fit
+from workbench.fit.parameter_estimate import parameter_table
 from workbench.select.block_errors import BlockErrors, block_errors
 from workbench.select.effect_acceptance import Gain, gain
 from workbench.select.pressure_scatter import with_pressure_scatter

@@ -4,7 +4,7 @@ from typing import Any
 
 from workbench.diagnosis.extension import Extension
 from workbench.fit.fit_result import Fit
-from workbench.fit.fitted_parameter import parameters_json
+from workbench.fit.parameter_estimate import parameters_json
 from workbench.select.block_errors import BlockErrors, errors_json
 from workbench.select.candidate_table import gain_json
 

@@ -14,7 +14,7 @@ from config.valve_file import ValveFile
 from sim.effect import Effect, find_effect
 from workbench.diagnosis.doubt import Case, Doubt
 from workbench.fit.fit_result import Fit
-from workbench.fit.fitted_parameter import Fitted
+from workbench.fit.parameter_estimate import Fitted
 from workbench.select.equivalence import algebraic_class, distinguishing_record
 
 WORTH_SAYING = 0.01

@@ -23,7 +23,7 @@ from workbench.data.noise_floor import say_m
 from workbench.discover.added_force import Landing, landings
 from workbench.discover.form_search import search_forms
 from workbench.discover.found_form import FoundForm
-from workbench.fit.fitted_parameter import parameter_table
+from workbench.fit.parameter_estimate import parameter_table
 from workbench.select.candidate_table import candidate_columns, candidate_table, lengths
 from workbench.select.effect_candidates import EffectCandidate, EvaluatedModel
 from workbench.select.effect_search import EffectSearch, Progress

@@ -4,7 +4,7 @@ from typing import Any
 
 from workbench.discover.discovery import Discovery
 from workbench.discover.found_form import FoundForm
-from workbench.fit.fitted_parameter import parameters_json
+from workbench.fit.parameter_estimate import parameters_json
 from workbench.select.block_errors import errors_json
 from workbench.select.candidate_table import candidate_json
 

@@ -17,8 +17,8 @@ from math import log
 import numpy as np
 
 from sim.effect import Effect
+from workbench.fit.fit_problem import Problem
 from workbench.fit.fit_result import Fit
-from workbench.fit.problem import Problem
 from workbench.fit.threads import on_threads
 from workbench.model.search_coordinates import MOST_GRID
 from workbench.select.tangent_preview import Left

@@ -20,9 +20,9 @@ from workbench.discover.form_file import write_forms
 from workbench.discover.form_proposal import Point, propose_forms
 from workbench.discover.found_form import FoundForm
 from workbench.discover.grammar import FORMS, Form
+from workbench.fit.fit_problem import Problem
 from workbench.fit.fit_result import Fit
 from workbench.fit.fitting import effect_fit, problem_of
-from workbench.fit.problem import Problem
 from workbench.fit.threads import on_threads
 from workbench.select.effect_candidates import EffectCandidate, EffectStep, EvaluatedModel, judged_step
 from workbench.select.effect_search import Progress, evaluated

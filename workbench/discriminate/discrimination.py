@@ -33,7 +33,7 @@ from workbench.discriminate.experiment_design import (
 from workbench.discriminate.rival_odds import ODDS, RivalOdds
 from workbench.discriminate.rivals_by_pressure import race_by_pressure
 from workbench.fit.fit_result import Fit
-from workbench.fit.fitted_parameter import parameters_json
+from workbench.fit.parameter_estimate import parameters_json
 from workbench.select.effect_search import Progress
 from workbench.select.equivalence import classes
 

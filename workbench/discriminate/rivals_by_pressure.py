@@ -14,9 +14,9 @@ from config.recording import Recording
 from sim.effect import Effect
 from workbench.data.held_out import join_recordings
 from workbench.data.record import ready
+from workbench.fit.fit_problem import Problem
 from workbench.fit.fit_result import Fit
 from workbench.fit.fitting import base_fit
-from workbench.fit.problem import Problem
 from workbench.fit.threads import on_threads
 from workbench.model.told_run import told_moves
 

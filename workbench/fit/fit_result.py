@@ -20,10 +20,10 @@ from workbench.compare.comparison_sentences import shorten_notes
 from workbench.compare.measures import fit_percent
 from workbench.data.noise_floor import say_m
 from workbench.data.record import Record, ready
-from workbench.fit.fitted_parameter import Fitted, draw_parameters, parameter_columns, parameter_table
+from workbench.fit.fit_problem import Problem
 from workbench.fit.likelihood import Groups, Likelihood, Rows, soft
 from workbench.fit.minimiser import End
-from workbench.fit.problem import Problem
+from workbench.fit.parameter_estimate import Fitted, draw_parameters, parameter_columns, parameter_table
 from workbench.fit.uncertainty import RISE_95, Combination, Uncertainty, uncertainty
 from workbench.model.free_run import FreeRun
 from workbench.model.search_coordinates import Parameter

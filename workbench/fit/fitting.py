@@ -20,11 +20,11 @@ from sim.karnopp import Vector
 from workbench.data.record import Record, ready, require_few_samples
 from workbench.data.stretches import informative
 from workbench.fit.ends import NATS, search_about, settle
+from workbench.fit.fit_problem import Problem, problem
 from workbench.fit.fit_result import Fit, Terms, fit_at, terms_of_all
 from workbench.fit.likelihood import Likelihood
 from workbench.fit.minimiser import COARSE, GLIMPSE, WHOLE, Effort, End, begin_by_landings, derivatives, descend
 from workbench.fit.onsets import with_onsets
-from workbench.fit.problem import Problem, problem
 from workbench.fit.starts import (
     Origin,
     base_starts,

@@ -32,8 +32,8 @@ from workbench.compare.comparison import NUMERICAL, Comparison, compare
 from workbench.data.kept_results import key_of
 from workbench.diagnosis.diagnosis import Diagnosis, diagnose
 from workbench.fit.fit_result import Fit
-from workbench.fit.fitted_parameter import Fitted
 from workbench.fit.fitting import fit
+from workbench.fit.parameter_estimate import Fitted
 
 RULES = 5
 """To be raised when an examination would come out differently: what was kept is then made anew."""

@@ -29,7 +29,7 @@ from workbench.compare.comparison import Comparison
 from workbench.diagnosis.diagnosis import Diagnosis
 from workbench.diagnosis.extension import Extension, extension_of
 from workbench.diagnosis.extension_journal import Journal, write_extended
-from workbench.fit.fitted_parameter import Fitted
+from workbench.fit.parameter_estimate import Fitted
 from workbench.page.background import (
     Limits,
     Task,

@@ -10,7 +10,7 @@ from webpage.live_text import LiveText
 from webpage.messages import errors_told, heading
 from webpage.number_field import NumberField
 from webpage.units import Units
-from workbench.fit.fitted_parameter import Fitted
+from workbench.fit.parameter_estimate import Fitted
 from workbench.model.search_coordinates import Parameter
 from workbench.page.explained_words import about_effect, explain_text
 from workbench.page.live_model import LiveModel

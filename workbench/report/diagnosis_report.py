@@ -11,7 +11,7 @@ from sim.effect import find_effect
 from workbench.compare.comparison import Comparison, compare
 from workbench.data.held_out import Split
 from workbench.diagnosis.diagnosis import Diagnosis
-from workbench.fit.fitted_parameter import Fitted
+from workbench.fit.parameter_estimate import Fitted
 from workbench.model.simulation_regime import MORE_LANDINGS
 from workbench.report import effect_ranking
 from workbench.report import report_html as page

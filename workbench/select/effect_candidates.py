@@ -11,7 +11,7 @@ from config.results.result import Brief
 from config.valve_file import ValveParameters
 from sim.effect import Effect, Parameter
 from workbench.fit.fit_result import Fit
-from workbench.fit.fitted_parameter import parameters_json
+from workbench.fit.parameter_estimate import parameters_json
 from workbench.select.block_errors import AT_FLOOR, BlockErrors, errors_json
 from workbench.select.candidate_table import Tried
 from workbench.select.effect_acceptance import LEAST_BIC, OVERWHELMING_BIC, Gain, gain, no_better

@@ -23,9 +23,9 @@ from config.errors import InputError
 from config.valve_file import ValveFile
 from sim.effect import Effect
 from workbench.data.held_out import Split
+from workbench.fit.fit_problem import Problem, problem
 from workbench.fit.fit_result import Fit
 from workbench.fit.fitting import Trial, advance, base_fit, finish, glimpse, leave_off, settled
-from workbench.fit.problem import Problem, problem
 from workbench.fit.threads import on_threads
 from workbench.select.block_errors import block_errors
 from workbench.select.effect_acceptance import LEAST_BIC, evidence_for, promise

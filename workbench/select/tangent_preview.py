@@ -18,11 +18,11 @@ import numpy.typing as npt
 from sim.composition import Composition
 from sim.effect import Effect
 from workbench.fit.breaking_off import go_on
+from workbench.fit.fit_problem import Problem
 from workbench.fit.fit_result import Fit
 from workbench.fit.fitting import extended
 from workbench.fit.likelihood import Groups, soft_weight
 from workbench.fit.minimiser import derivatives
-from workbench.fit.problem import Problem
 from workbench.fit.threads import on_threads
 
 Series = npt.NDArray[np.float64]
