@@ -45,6 +45,8 @@ UNKNOWN = unknown_travel(daemon_file())
 BOUNDS = Settings.of(UNKNOWN).experiment
 OFF_M = 1e-3
 """The reading's zero."""
+WITHIN_S = 300.0
+"""Wherever the stem is at first."""
 SITE = f"""# FV-1, behind the boiler
 [valve]
 name = "FV-1"     # as the plant calls it
@@ -101,6 +103,7 @@ def test_a_valve_that_nobody_has_described_runs_after_it(
     low_pa = (PRELOAD_N + 0.12 * 207.5) / AREA_M2
     assert file.law.offset_pa == pytest.approx(low_pa - SLOPE * OFF_M, rel=0.03)
     assert "its zero is off, set it in the device" in capsys.readouterr().out
+    assert stranger.cycle.snapshot.sample.time_s < WITHIN_S
     loop = VirtualLoop(file, stranger.device)
     for opening in (0.3, 0.7, 0.65):
         loop.refer_to(file.valve.travel.stem_m(opening) / file.valve.stroke_m, 15.0)
@@ -108,12 +111,10 @@ def test_a_valve_that_nobody_has_described_runs_after_it(
         assert file.valve.travel.opening(reading_m) == pytest.approx(opening, abs=0.01)
 
 
-@pytest.mark.parametrize("air", [0.5, 1.0])
-def test_wherever_the_stem_is_it_takes_less_than_five_minutes(air: float) -> None:
-    initial = Initial(position_m=air * STROKE_M, pressure_pa=air * MAXIMUM_PA)
-    found, valve = commissioned(noise=1e-3, initial=initial)
+def test_from_full_air_it_takes_less_than_five_minutes_too() -> None:
+    found, valve = commissioned(noise=1e-3, initial=Initial(position_m=STROKE_M, pressure_pa=MAXIMUM_PA))
     assert found.outcome.passed
-    assert valve.cycle.snapshot.sample.time_s < 300.0
+    assert valve.cycle.snapshot.sample.time_s < WITHIN_S
 
 
 def test_where_nobody_agrees_nothing_is_moved_nor_written(
