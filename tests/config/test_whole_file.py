@@ -3,6 +3,7 @@
 import os
 import resource
 from collections.abc import Iterator
+from contextlib import contextmanager
 from pathlib import Path
 
 import numpy as np
@@ -17,23 +18,25 @@ from config.whole_file import beside, filling
 ROOM_BYTES = 64
 
 
-@pytest.fixture
+@contextmanager
 def full_disk() -> Iterator[None]:
-    """No file grows beyond a few bytes."""
+    """No file of this process grows beyond a few bytes, that which pytest may write to among them."""
     usual = resource.getrlimit(resource.RLIMIT_FSIZE)
     resource.setrlimit(resource.RLIMIT_FSIZE, (ROOM_BYTES, usual[1]))
-    yield
-    resource.setrlimit(resource.RLIMIT_FSIZE, usual)
+    try:
+        yield
+    finally:
+        resource.setrlimit(resource.RLIMIT_FSIZE, usual)
 
 
-def test_a_full_disk_leaves_the_file_that_was_there(tmp_path: Path, full_disk: None) -> None:
+def test_a_full_disk_leaves_the_file_that_was_there(tmp_path: Path) -> None:
     rows = np.arange(100.0)
     valve, recording = tmp_path / "v.toml", tmp_path / "r.csv"
     for path in (valve, recording):
         path.write_text("the old one")
-    with pytest.raises(InputError, match=r"v.toml: cannot be written: "):
+    with full_disk(), pytest.raises(InputError, match=r"v.toml: cannot be written: "):
         write_valve(valve, load_valve(shipped_valve("seed")))
-    with pytest.raises(InputError, match=r"r.csv: cannot be written: "):
+    with full_disk(), pytest.raises(InputError, match=r"r.csv: cannot be written: "):
         write_recording(recording, Recording({"time_s": rows, "command_pa": rows, "position_m": rows}))
     assert [path.read_text() for path in (valve, recording)] == ["the old one", "the old one"]
     assert sorted(tmp_path.iterdir()) == [recording, valve]
@@ -72,7 +75,7 @@ def test_a_pipe_or_a_device_is_written_itself(tmp_path: Path) -> None:
     assert pipe.is_fifo()
 
 
-def test_a_folder_is_filled_whole_or_not_at_all(tmp_path: Path, full_disk: None) -> None:
+def test_a_folder_is_filled_whole_or_not_at_all(tmp_path: Path) -> None:
     folder = tmp_path / "new" / "folder"
 
     def filled(text: str) -> None:
@@ -80,7 +83,7 @@ def test_a_folder_is_filled_whole_or_not_at_all(tmp_path: Path, full_disk: None)
             for name in ("a", "b"):
                 (new / name).write_text(name if name == "a" else text)
 
-    with pytest.raises(OSError, match="too large"):
+    with full_disk(), pytest.raises(OSError, match="too large"):
         filled("b" * (ROOM_BYTES + 1))
     assert list(tmp_path.iterdir()) == []
     filled("b")
