@@ -8,7 +8,7 @@ import pytest
 
 from config.recording import Recording
 from config.valve_file import valve
-from tests.workbench.fleets import record
+from tests.workbench.fleets import ROWS, record
 from workbench.compare.comparison import Comparison, compare
 from workbench.fleet.examination import LOOK_FLOORS, floors_allowed, is_at_floor, is_structured
 
@@ -37,8 +37,8 @@ def test_what_goes_on_from_sample_to_sample_is_no_noise(tmp_path: Path, floors: 
 
 def test_of_few_samples_the_error_may_lie_higher_by_chance(tmp_path: Path) -> None:
     many, few = compared(tmp_path), compared(tmp_path, rows=250)
-    assert (many.valid_samples, few.valid_samples) == (1000, 250)
-    assert floors_allowed(many.valid_samples) == pytest.approx(1.158, abs=0.005)
+    assert (many.valid_samples, few.valid_samples) == (ROWS, 250)
+    assert floors_allowed(1000) == pytest.approx(1.158, abs=0.005)
     assert floors_allowed(few.valid_samples) == pytest.approx(1.316, abs=0.005)
 
 
