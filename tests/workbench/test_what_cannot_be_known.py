@@ -18,7 +18,7 @@ Spoil = Callable[[dict[str, Column], Column], dict[str, Column]]
 
 @cache
 def hidden(seed: int) -> Hidden:
-    return hide(seed, duration_s=12.0)
+    return hide(seed, duration_s=20.0)
 
 
 REFUSED: dict[str, tuple[Spoil, str]] = {
