@@ -42,7 +42,7 @@ from workbench.select.equivalence import algebraic_class
 SEEDS: Mapping[str, range] = {
     "clean": range(81000, 81100),
     "dirty": range(82000, 82060),
-    "nothing": range(83000, 83040),
+    "nothing": range(83000, 83300),
     "two": range(84000, 84020),
     "two_dirty": range(86000, 86010),
     "removed": range(85000, 85040),

@@ -282,6 +282,6 @@ def diagnose(
 
 
 def _last(steps: Sequence[EffectStep]) -> EvaluatedModel:
-    """Return what the steps have come to; a base fitted again, and better, takes the place of the first."""
+    """Return what the steps have come to."""
     added = steps[-1].added
     return added.model if added and added.model else steps[-1].before
