@@ -123,5 +123,5 @@ def test_a_person_meets_it_as_diagnose(capsys: pytest.CaptureFixture[str]) -> No
     assert main(["diagnose", path, "--valve", "seed"]) == 1
     out = capsys.readouterr().out
     assert out.startswith(
-        "the recording has no command: forces are balanced, nothing is simulated\none_of: Missing: position_friction"
+        "the recording has no command: forces are balanced, nothing is simulated\none of several: Missing: position_friction"
     )

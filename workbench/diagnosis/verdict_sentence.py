@@ -29,7 +29,8 @@ REPEAT = " To see whether the valve itself scatters so much, let the command rep
 
 def verdict_line(verdict: Verdict, sentence: str) -> str:
     """Return a verdict and its sentence in one line; what both say is said once."""
-    return f"{verdict}: {sentence.removeprefix(f'{verdict.capitalize()}: ')}"
+    word = "one of several" if verdict == "one_of" else verdict
+    return f"{word}: {sentence.removeprefix(f'{verdict.capitalize()}: ')}"
 
 
 def verdict_sentence(
