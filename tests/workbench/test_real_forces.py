@@ -122,6 +122,5 @@ def test_a_person_meets_it_as_diagnose(capsys: pytest.CaptureFixture[str]) -> No
     path = str(DATA / "diaphragm_bench" / "static_curve.csv")
     assert main(["diagnose", path, "--valve", "seed"]) == 1
     out = capsys.readouterr().out
-    assert out.startswith(
-        "the recording has no command: forces are balanced, nothing is simulated\none of several: Missing: position_friction"
-    )
+    assert "no command: forces are balanced" in out
+    assert "one of several: Missing: position_friction" in out

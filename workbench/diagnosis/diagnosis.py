@@ -229,13 +229,15 @@ def diagnose(
     threads = workers or cpu_count() or 1
     tell = progress or (lambda _what, _done: None)
     search = EffectSearch(parts, library, valve, workers=threads, progress=tell, race=race, from_pressure=from_pressure)
-    with ending(over or (lambda: False)):
+    is_over = over or (lambda: False)
+    with ending(is_over):
         base = search.base(valve)
-        parts = search.split
-        given = AsGiven.of(valve, parts, base.fit)
-        scores: tuple[TangentScore, ...] = ()
-        held = None
-        try:
+    parts = search.split
+    given = AsGiven.of(valve, parts, base.fit)
+    scores: tuple[TangentScore, ...] = ()
+    held = None
+    try:
+        with ending(is_over):
             if parts.train.record.by_setpoint and not from_pressure and not parts.early:
                 held = positioner_or_packing(
                     parts, base, workers=threads, progress=lambda done: tell("positioner or packing", done)
@@ -261,9 +263,9 @@ def diagnose(
             doubts = doubts_about(case)
             found = "unexplained" if any(each.overturns for each in doubts) else case.verdict
             chosen = search.experiment(steps) if found == "one_of" else None
-        except (BrokenOff, KeyboardInterrupt):
-            steps, found, chosen, doubts = search.so_far(base), "unfinished", None, ()
-            best = _last(steps)
+    except (BrokenOff, KeyboardInterrupt):
+        steps, found, chosen, doubts = search.so_far(base), "unfinished", None, ()
+        best = _last(steps)
     return Diagnosis(
         steps=steps,
         verdict=found,
