@@ -224,9 +224,13 @@ def fit_at(problem: Problem, like: Likelihood, end: End, agreement: int) -> Fit:
 
 
 def _as_runs_freely(like: Likelihood, end: End, determined: Uncertainty) -> End:
-    """Return an end at the static friction, of those that break-aways leave open, with which a free run does best."""
+    """Return an end at the static friction, of those that break-aways leave open, with which a free run does best.
+
+    Seen seldom, or behind a positioner, a free run soon goes its own way: there it is asked where nothing breaks loose.
+    """
     rows = [i for i, each in enumerate(like.parameters) if each.index == STATIC]
-    if not rows or like.by.slow or like.record.by_setpoint:
+    goes_its_own_way = like.by.slow or like.record.by_setpoint
+    if not rows or (goes_its_own_way and like.broken.size):
         return end
     (i,) = rows
     low, high = like.parameters[i].bounds
