@@ -55,6 +55,11 @@ class Case:
     """Those of the checks before."""
 
     @property
+    def outcome(self) -> Verdict:
+        """The verdict, unless a doubt has overturned it."""
+        return "unexplained" if any(each.overturns for each in self.doubts) else self.verdict
+
+    @property
     def explained(self) -> bool:
-        """Whether the verdict is that all is explained, and no doubt has overturned it."""
-        return self.verdict in EXPLAINED and not any(each.overturns for each in self.doubts)
+        """Whether all is explained."""
+        return self.outcome in EXPLAINED

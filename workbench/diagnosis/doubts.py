@@ -24,9 +24,9 @@ CHECKS: tuple[Callable[[Case], Doubt | None], ...] = (
 )
 
 
-def doubts_about(case: Case) -> tuple[Doubt, ...]:
-    """Return what speaks against a verdict, in the order of the checks."""
+def doubted(case: Case) -> Case:
+    """Return a case with what speaks against its verdict, in the order of the checks."""
     for check in () if case.parts.early else CHECKS:
         if doubt := check(case):
             case = replace(case, doubts=(*case.doubts, doubt))
-    return case.doubts
+    return case
