@@ -20,7 +20,7 @@ from workbench.compare.comparison_sentences import shorten_notes
 from workbench.data.held_out import Split, split
 from workbench.data.noise_floor import UNKNOWN, say_m
 from workbench.diagnosis.doubt import Case, Doubt
-from workbench.diagnosis.doubts import doubted
+from workbench.diagnosis.doubts import with_doubts
 from workbench.diagnosis.error_before_fit import AsGiven
 from workbench.diagnosis.judged_landings import judged_landings
 from workbench.diagnosis.positioner_or_packing import PositionerOrPacking, positioner_or_packing
@@ -249,7 +249,7 @@ def diagnose(
             steps = search.steps(base)
             best = _last(steps)
             landed = judged_landings(best.fit, parts)
-            asked = Case(
+            bare = Case(
                 verdict=verdict(best, steps, parts.motion_std_m, parts.floor_m, landed, parts.early),
                 best=best,
                 steps=steps,
@@ -260,7 +260,7 @@ def diagnose(
                 workers=threads,
                 progress=tell,
             )
-            case = doubted(asked)
+            case = with_doubts(bare)
             found, doubts = case.outcome, case.doubts
             chosen = search.experiment(steps) if found == "one_of" else None
     except (BrokenOff, KeyboardInterrupt):

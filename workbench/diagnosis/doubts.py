@@ -24,7 +24,7 @@ CHECKS: tuple[Callable[[Case], Doubt | None], ...] = (
 )
 
 
-def doubted(case: Case) -> Case:
+def with_doubts(case: Case) -> Case:
     """Return a case with what speaks against its verdict, in the order of the checks."""
     for check in () if case.parts.early else CHECKS:
         if doubt := check(case):
