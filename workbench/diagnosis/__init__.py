@@ -3,6 +3,7 @@
 Its files:
 
     diagnosis, diagnosis_json                     puts it together; the same as JSON
+    diagnosis_thresholds                          every number by which it decides
     verdict, verdict_sentence                     what follows, and how it is said
     judged_landings                               how many landings a verdict rests on, where nothing else is judged
     error_before_fit                              what the file leaves before anything is fitted

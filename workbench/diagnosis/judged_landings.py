@@ -13,11 +13,10 @@ left there nobody can say that something is missing. Nor where a record does not
 from dataclasses import dataclass
 
 from workbench.data.held_out import Part, Split
+from workbench.diagnosis.diagnosis_thresholds import DIAGNOSIS
 from workbench.fit.fit_result import Fit
 from workbench.model.simulation_regime import MORE_LANDINGS, Sampling, landings
 
-A_PARAMETER_FITTED, A_PARAMETER_HELD_OUT = 2, 1
-"""Landings that each parameter takes; more are needed."""
 UNTOLD = (
     "the recording does not show whether, or when, the command changed between samples, and the error that is left may "
     "come from that"
@@ -35,8 +34,7 @@ class JudgedLandings:
     @property
     def enough(self) -> bool:
         """Whether a verdict can rest on them."""
-        held_out = self.held_out > A_PARAMETER_HELD_OUT * self.parameters
-        return self.fitted > A_PARAMETER_FITTED * self.parameters and held_out
+        return self.fitted > DIAGNOSIS.landings_a_parameter * self.parameters and self.held_out > self.parameters
 
     @property
     def sentence(self) -> str:
@@ -45,7 +43,7 @@ class JudgedLandings:
             return "the error that landings leave may come from the pressure between samples, which is not known"
         return (
             f"{self.fitted} landings fitted and {self.held_out} held out are too few for {self.parameters} parameters, "
-            f"more than {A_PARAMETER_FITTED * self.parameters} and {A_PARAMETER_HELD_OUT * self.parameters} are needed"
+            f"more than {DIAGNOSIS.landings_a_parameter * self.parameters} and {self.parameters} are needed"
         )
 
 

@@ -10,6 +10,7 @@ from dataclasses import dataclass
 from typing import Any
 
 from config.drive import Kind
+from workbench.diagnosis.diagnosis_thresholds import DIAGNOSIS
 from workbench.diagnosis.doubt import Case, Doubt
 from workbench.fit.fitting import base_fit, problem_of
 from workbench.select.block_errors import NOISE_KNOWN_TO, BlockErrors
@@ -18,12 +19,6 @@ from workbench.select.effect_candidates import EvaluatedModel
 from workbench.select.effect_search import evaluated
 
 MASS = "mass_kg"
-BEGINS = (1.0, 0.2)
-"""Shares of the valve file's mass at which searches begin, the rest as the best model has it: one that is too heavy
-hides that a light one does better."""
-
-MOST_LEFT = 0.5
-"""Of the squares of what was left beyond the floor."""
 
 
 @dataclass(frozen=True, slots=True, repr=False)
@@ -67,8 +62,9 @@ def kept_mass(case: Case) -> KeptMass | None:
     kept_kg = before.valve.valve.mass_kg
     free = [*before.parameters, MASS]
     models: list[EvaluatedModel] = []
-    for number, share in enumerate(BEGINS):
-        case.progress("fitting the mass, too", number / len(BEGINS))
+    shares = (1.0, DIAGNOSIS.light_mass)
+    for number, share in enumerate(shares):
+        case.progress("fitting the mass, too", number / len(shares))
         valve = before.valve.valve.model_copy(update={MASS: share * kept_kg})
         begin = before.valve.model_copy(update={"valve": valve})
         found = base_fit(problem_of(before, parts.train.record), begin, free=free)
@@ -86,7 +82,7 @@ def explains_most(before: BlockErrors, after: BlockErrors, floor_m: float | None
     """Whether most of what was left beyond the floor, m, in squares, is gone, fitted and held out."""
     floor = (floor_m or 0.0) ** 2
     rmse_m = ((before.train_rmse_m, after.train_rmse_m), (before.test_rmse_m, after.test_rmse_m))
-    return all(now_m**2 - floor <= MOST_LEFT * max(then_m**2 - floor, 0.0) for then_m, now_m in rmse_m)
+    return all(now_m**2 - floor <= DIAGNOSIS.most_left * max(then_m**2 - floor, 0.0) for then_m, now_m in rmse_m)
 
 
 def leaves_something(best: EvaluatedModel) -> bool:

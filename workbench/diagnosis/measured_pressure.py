@@ -14,16 +14,12 @@ from dataclasses import dataclass
 from typing import Any
 
 from config.drive import Kind
+from workbench.diagnosis.diagnosis_thresholds import DIAGNOSIS
 from workbench.diagnosis.doubt import Case, Doubt
 from workbench.diagnosis.pressure_scale import PressureScale, pressure_scale
 from workbench.fit.fitting import fit
 from workbench.select.effect_candidates import EvaluatedModel, model_json, outdoes
 from workbench.select.effect_search import evaluated
-
-MATTERS = 0.03
-"""Of the friction."""
-ANOTHER = 0.02
-"""Relative difference from which a parameter is another."""
 
 
 @dataclass(frozen=True, slots=True, repr=False)
@@ -77,7 +73,7 @@ def by_measured_pressure(case: Case) -> ByMeasuredPressure | PressureScale | Non
         return None
     valve, off_pa = best.fit.valve.valve, best.pressure.structured_pa
     of_friction = valve.diaphragm_area_m2 * off_pa / valve.coulomb_n if valve.coulomb_n else 0.0
-    if of_friction <= MATTERS:
+    if of_friction <= DIAGNOSIS.pressure_off:
         return None
     if scale := pressure_scale(record):
         return scale
@@ -85,7 +81,8 @@ def by_measured_pressure(case: Case) -> ByMeasuredPressure | PressureScale | Non
     others = tuple(
         (name, before.value, after.value)
         for name, after in model.fit.parameters.items()
-        if (before := best.fit.parameters.get(name)) and abs(after.value - before.value) > ANOTHER * abs(before.value)
+        if (before := best.fit.parameters.get(name))
+        and abs(after.value - before.value) > DIAGNOSIS.another_value * abs(before.value)
     )
     return ByMeasuredPressure(off_pa, of_friction, model, others, best.errors.test_rmse_m, outdoes(best, model))
 

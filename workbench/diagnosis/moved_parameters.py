@@ -12,13 +12,11 @@ from typing import Any
 from config.drive import Kind
 from config.valve_file import ValveFile
 from sim.effect import Effect, find_effect
+from workbench.diagnosis.diagnosis_thresholds import DIAGNOSIS
 from workbench.diagnosis.doubt import Case, Doubt
 from workbench.fit.fit_result import Fit
 from workbench.fit.parameter_estimate import Fitted
 from workbench.select.equivalence import algebraic_class, distinguishing_record
-
-WORTH_SAYING = 0.01
-"""Of the file's value: a smaller shift is no news, however narrow the interval."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -94,7 +92,7 @@ def excluded_parameters(file: ValveFile, fit: Fit, library: Mapping[str, Effect]
 
 def _excluded(before: float, found: Fitted) -> bool:
     outside = not found.lower <= before <= found.upper
-    return outside and abs(found.value - before) > WORTH_SAYING * abs(before)
+    return outside and abs(found.value - before) > DIAGNOSIS.moved * abs(before)
 
 
 def _like(name: str, library: Mapping[str, Effect], there: set[str]) -> tuple[str, ...]:

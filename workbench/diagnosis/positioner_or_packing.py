@@ -16,8 +16,8 @@ out.
 
 Where the actuator's pressure was measured, each is asked on its own side of it: friction from the pressure to the stem,
 with the positioner out of the path; the dead band from the set point to the stem, with spring and friction kept as they
-were found there. What the pressure's noise makes of friction is none: its play, 2 F_c / k_s, must be `WORTH` times what
-the valve with friction leaves. Where that does not tell, the set point is asked alone.
+were found there. What the pressure's noise makes of friction is none: its play, 2 F_c / k_s, must be several times what
+is left with friction (`play_of_error`). Where that does not tell, the set point is asked alone.
 """
 
 from collections.abc import Callable, Mapping
@@ -29,6 +29,7 @@ from config.results.result import Brief
 from config.valve_file import EffectTable, ValveFile
 from sim.effect import find_effect
 from workbench.data.held_out import Split
+from workbench.diagnosis.diagnosis_thresholds import DIAGNOSIS
 from workbench.fit.fit_result import Fit
 from workbench.fit.fitting import fit
 from workbench.model.search_coordinates import BEHIND_POSITIONER as FREE
@@ -38,14 +39,8 @@ from workbench.select.effect_candidates import EvaluatedModel
 
 Cause = Literal["packing", "positioner", "both", "at least packing", "at least positioner", "not told"]
 DEAD_BAND = "dead_band_m"
-HALF = 0.5
-"""Of what is needed: so much of the other must be excluded, where that is not needed."""
-WORTH = 4.0
-"""Times what is left, that friction found from a measured pressure must be worth."""
 ROUGH = "But the valve with both does not explain the recording: these figures are rough"
 NOTHING = Gain(0.0, 0.0, 0.0)
-NO_FRICTION = 1e-3
-"""Of the fitted one: what a stem without friction has left, by which it comes to rest."""
 
 
 @dataclass(frozen=True, slots=True, repr=False)
@@ -167,18 +162,19 @@ def _asked(
     valve, band_m = stem.valve.valve, _value(banded, dead_band)
     n_per_m = 0.5 * valve.spring_n_per_m
     play_m = valve.coulomb_n / n_per_m if n_per_m else 0.0
-    friction = _worth(with_friction(NO_FRICTION * valve.coulomb_n, 0.0), stem, split)
+    friction = _worth(with_friction(DIAGNOSIS.friction_left * valve.coulomb_n, 0.0), stem, split)
     band = _worth(with_dead_band(0.0, 0.3), banded, split)
-    if stem.from_pressure and play_m < WORTH * friction.with_m:
+    if stem.from_pressure and play_m < DIAGNOSIS.play_of_error * friction.with_m:
         friction = friction._replace(gain=NOTHING)
     found = cause(friction.gain, band.gain) if _found_twice(banded) else "not told"
     # What was fitted may speak for the other, though what was held out does not: then it is not said to be none.
+    share = DIAGNOSIS.other_cause
     if found == "packing" and (
-        band.gain.bic > LEAST_BIC or not _excluded(with_dead_band(HALF * play_m, 0.6), banded, split)
+        band.gain.bic > LEAST_BIC or not _excluded(with_dead_band(share * play_m, 0.6), banded, split)
     ):
         found = "at least packing"
     if found == "positioner" and (
-        friction.gain.bic > LEAST_BIC or not _excluded(with_friction(HALF * band_m * n_per_m, 0.6), stem, split)
+        friction.gain.bic > LEAST_BIC or not _excluded(with_friction(share * band_m * n_per_m, 0.6), stem, split)
     ):
         found = "at least positioner"
     return PositionerOrPacking(

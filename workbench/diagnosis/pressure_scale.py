@@ -17,16 +17,9 @@ from config.drive import Kind
 from config.recording import Column
 from workbench.data.pressure_lag import command_followed_pa
 from workbench.data.record import UNITS_PA, Record
+from workbench.diagnosis.diagnosis_thresholds import DIAGNOSIS
 from workbench.diagnosis.doubt import Case, Doubt
-
-SPAN_OFF, ZERO_OFF, FOLLOWS = 1.25, 0.2, 1.0 / 3.0
-LAGS = np.geomspace(1e-2, 1e3, 41)
-"""Over the period of the samples."""
-ROUNDS, LEAST_PA = 10, 1e-3
-"""Of weighted least squares, which come to the least mean |e|; and what counts as none there."""
-ALIKE_RATIO = 0.03
-"""Relative, of what is taken for the ratio of two units, or for an atmosphere."""
-ATMOSPHERE_PA = 101325.0
+from workbench.imports.cell_units import ATMOSPHERE_PA
 
 
 @dataclass(frozen=True, slots=True, repr=False)
@@ -44,7 +37,7 @@ class PressureScale(Doubt):
         way = f"{self.span:.3g} times as large as" if off_span else "off"
         read = next((f", as {one} read as {other} are" for one, other in _units(self.span)), "") if off_span else ""
         by = "" if off_span else f" by {kind.command.read.said(self.above_pa)}"
-        zero = "" if off_span or abs(self.above_pa / ATMOSPHERE_PA - 1.0) > ALIKE_RATIO else ", like an absolute one"
+        zero = ", like an absolute one" if not off_span and _is_one(self.above_pa / ATMOSPHERE_PA) else ""
         return kind.text(
             f"the measured {kind.command.word} is {way} the command{by}{read or zero}, so forces fitted by it are "
             "wrong; correct its unit, zero or line, or diagnose by the command"
@@ -69,11 +62,12 @@ def pressure_scale(record: Record) -> PressureScale | None:
     rows = rows if record.pressure_known is None else rows[record.pressure_known[rows]]
     if not rows.size:
         return None
-    found = min((_fitted(record, p, rows, share * record.period_s) for share in LAGS), key=lambda each: each[0])
+    lags = np.geomspace(DIAGNOSIS.shortest_lag, DIAGNOSIS.longest_lag, DIAGNOSIS.lags)
+    found = min((_fitted(record, p, rows, share * record.period_s) for share in lags), key=lambda each: each[0])
     left_pa, span, above_pa, spanned_pa = found
-    if left_pa > FOLLOWS * float(np.mean(np.abs(p[rows] - np.median(p[rows])))):
+    if left_pa > DIAGNOSIS.pressure_unfollowed * float(np.mean(np.abs(p[rows] - np.median(p[rows])))):
         return None
-    off = _is_another_span(span) or abs(above_pa) > ZERO_OFF * spanned_pa
+    off = _is_another_span(span) or abs(above_pa) > DIAGNOSIS.scale_off * spanned_pa
     return PressureScale(span, above_pa) if off else None
 
 
@@ -83,21 +77,26 @@ def _fitted(record: Record, pressure_pa: Column, rows: Column, lag_s: float) -> 
     m = command_followed_pa(record.period_s, lag_s, u, u)[rows]  # settled where the record begins
     p, middle_pa = pressure_pa[rows], float(np.median(m))
     beside_pa, w = m - middle_pa, np.ones(rows.size)
-    for _ in range(ROUNDS):
+    for _ in range(DIAGNOSIS.scale_rounds):
         at_pa, mean_pa = np.average(beside_pa, weights=w), np.average(p, weights=w)
         spread = float(w @ (beside_pa - at_pa) ** 2)
         span = float(w @ ((beside_pa - at_pa) * (p - mean_pa))) / spread if spread else 1.0
         above_pa = float(mean_pa - span * at_pa) - middle_pa
         off_pa = np.abs(p - middle_pa - above_pa - span * beside_pa)
-        w = 1.0 / (off_pa + LEAST_PA)
+        w = 1.0 / (off_pa + DIAGNOSIS.pressure_none)
     return float(off_pa.mean()), span, above_pa, float(np.ptp(m))
 
 
 def _is_another_span(span: float) -> bool:
-    return not 1.0 / SPAN_OFF < span < SPAN_OFF
+    least = 1.0 - DIAGNOSIS.scale_off
+    return not least < span < 1.0 / least
 
 
 def _units(span: float) -> list[tuple[str, str]]:
     """Return which units read as which others would make a pressure so many times as large."""
     pairs = permutations(UNITS_PA, 2)
-    return [(one, other) for one, other in pairs if abs(span * UNITS_PA[one] / UNITS_PA[other] - 1.0) < ALIKE_RATIO]
+    return [(one, other) for one, other in pairs if _is_one(span * UNITS_PA[one] / UNITS_PA[other])]
+
+
+def _is_one(ratio: float) -> bool:
+    return abs(ratio - 1.0) < DIAGNOSIS.units_alike

@@ -8,6 +8,7 @@ from sim.composition import BASE, COULOMB, STATIC
 from sim.effect import Effect
 from workbench.data.held_out import Split
 from workbench.data.noise_floor import UNKNOWN
+from workbench.diagnosis.diagnosis_thresholds import DIAGNOSIS
 from workbench.diagnosis.error_before_fit import AsGiven
 from workbench.diagnosis.judged_landings import unknown_between_samples
 from workbench.diagnosis.verdict import EXPLAINED, Verdict, by_another_name
@@ -18,10 +19,6 @@ from workbench.select.effect_candidates import EffectCandidate, EffectStep, Eval
 from workbench.select.equivalence import classes, distinguishing_record
 from workbench.select.pressure_errors import PressureErrors
 
-NONE_ABOVE = 1.01
-"""Static over sliding friction."""
-SCATTERS = 3.0
-"""Times the noise: a valve that repeats itself no better scatters."""
 OF_COMMAND = "the floor is the repeatability under the command; driven by the measured pressure, less may be left"
 BREAKS_ELSEWHERE = " The stem breaks loose at other loads than this model has."
 REPEAT = " To see whether the valve itself scatters so much, let the command repeat a stretch."
@@ -121,7 +118,8 @@ def _no_break_away(found: Fit) -> str:
     Where samples are far apart a break-away falls between two of them, and an interval tells only of what is seen.
     """
     static, coulomb_n = found.parameters.get(BASE[STATIC]), found.valve.valve.coulomb_n
-    if not found.by.slow or static is None or not static.at_bound or static.value > NONE_ABOVE * coulomb_n:
+    most_n = DIAGNOSIS.static_at_least * coulomb_n
+    if not found.by.slow or static is None or not static.at_bound or static.value > most_n:
         return ""
     return (
         f" The samples are too far apart to show a break-away: {BASE[STATIC]} came out at {BASE[COULOMB]}, the least "
@@ -239,7 +237,9 @@ def _scatter(parts: Split, length: Scale) -> str:
     """
     known = [each.record.noise_m for each in (parts.train, parts.test) if each.record.noise_m is not None]
     noise_m = max(known, default=None)
-    if noise_m is None or parts.floor_m is None or parts.by_pressure or parts.floor_m < SCATTERS * noise_m:
+    if noise_m is None or parts.floor_m is None or parts.by_pressure:
+        return ""
+    if parts.floor_m < DIAGNOSIS.scatter_of_noise * noise_m:
         return ""
     return (
         f" The valve itself scatters: under a repeated command its position differs by {length.said(parts.floor_m)}, "
