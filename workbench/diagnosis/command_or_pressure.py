@@ -7,7 +7,7 @@ and an evidence of 10 in independent samples, the command is the better witness,
 """
 
 from dataclasses import dataclass
-from typing import Any
+from typing import Any, ClassVar
 
 from config.drive import Kind
 from workbench.diagnosis.doubt import Case, Doubt
@@ -18,6 +18,8 @@ from workbench.select.effect_candidates import EvaluatedModel, model_json, outdo
 @dataclass(frozen=True, slots=True, repr=False)
 class ByCommand(Doubt):
     """A model that by the measured pressure leaves more than by the command."""
+
+    key: ClassVar[str] = "by_command"
 
     by_pressure_rmse_m: float
     """Held out."""

@@ -4,30 +4,14 @@
 more than a factor of 2 in it, so it never exceeds 0.5.
 """
 
-from collections.abc import Mapping
 from typing import Any
 
-from workbench.diagnosis.command_or_pressure import ByCommand
 from workbench.diagnosis.diagnosis import Diagnosis
-from workbench.diagnosis.doubt import Doubt
-from workbench.diagnosis.imitating_effect import StandIn
-from workbench.diagnosis.kept_mass import KeptMass
-from workbench.diagnosis.measured_pressure import ByMeasuredPressure
-from workbench.diagnosis.moved_parameters import MovedParameters
-from workbench.diagnosis.pressure_scale import PressureScale
+from workbench.diagnosis.doubts import CHECKS
 from workbench.fit.parameter_estimate import parameters_json
 from workbench.select.candidate_table import candidate_json
 from workbench.select.effect_candidates import EffectCandidate, model_json
 from workbench.select.equivalence import undetectable
-
-KEYS: Mapping[type[Doubt], str] = {
-    MovedParameters: "moved",
-    KeptMass: "kept_mass",
-    ByMeasuredPressure: "by_pressure",
-    ByCommand: "by_command",
-    PressureScale: "pressure_scale",
-    StandIn: "stand_in",
-}
 
 
 def as_json(diagnosis: Diagnosis) -> dict[str, Any]:
@@ -44,7 +28,9 @@ def as_json(diagnosis: Diagnosis) -> dict[str, Any]:
         "indistinguishable": [list(names) for names in diagnosis.indistinguishable],
         "suspected": list(diagnosis.suspected),
         "contradicted": list(diagnosis.contradicted),
-        **_doubts(diagnosis),
+        **{each.key: None for each in CHECKS},
+        "moved": [],
+        **{each.key: each.as_json() for each in diagnosis.doubts},
         "parameters_off": diagnosis.parameters_off,
         "given": {
             "train_rmse_m": diagnosis.given.errors.train_rmse_m,
@@ -60,11 +46,6 @@ def as_json(diagnosis: Diagnosis) -> dict[str, Any]:
         ],
         "candidates": [_candidate(each) for each in diagnosis.candidates],
     }
-
-
-def _doubts(diagnosis: Diagnosis) -> dict[str, Any]:
-    found = {KEYS[type(each)]: each.as_json() for each in diagnosis.doubts}
-    return {key: found.get(key) for key in KEYS.values()} | {"moved": found.get("moved", [])}
 
 
 def _candidate(candidate: EffectCandidate) -> dict[str, Any]:

@@ -24,6 +24,8 @@ from workbench.select.effect_search import Progress
 class Doubt(Brief):
     """Why the best model of a diagnosis is not believed as it stands."""
 
+    key: ClassVar[str]
+    """Under which it stands in JSON."""
     overturns: ClassVar[bool] = False
     """Whether what explained the recording explains it no longer."""
 

@@ -32,6 +32,7 @@ from workbench.select.equivalence import algebraic_class
 class StandIn(Doubt):
     """What was named, and the form that does better."""
 
+    key: ClassVar[str] = "stand_in"
     overturns: ClassVar[bool] = True
 
     named: tuple[str, ...]

@@ -7,7 +7,7 @@ gone with it: of what the valve scatters a mass imitates some.
 """
 
 from dataclasses import dataclass
-from typing import Any
+from typing import Any, ClassVar
 
 from config.drive import Kind
 from workbench.diagnosis.diagnosis_thresholds import DIAGNOSIS
@@ -24,6 +24,8 @@ MASS = "mass_kg"
 @dataclass(frozen=True, slots=True, repr=False)
 class KeptMass(Doubt):
     """A mass beside which the best model of a diagnosis leaves less."""
+
+    key: ClassVar[str] = "kept_mass"
 
     kept_kg: float
     fitted_kg: float

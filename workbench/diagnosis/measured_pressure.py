@@ -11,7 +11,7 @@ does. But it moves no stem: where the stem follows the command better, that is s
 """
 
 from dataclasses import dataclass
-from typing import Any
+from typing import Any, ClassVar
 
 from config.drive import Kind
 from workbench.diagnosis.diagnosis_thresholds import DIAGNOSIS
@@ -25,6 +25,8 @@ from workbench.select.effect_search import evaluated
 @dataclass(frozen=True, slots=True, repr=False)
 class ByMeasuredPressure(Doubt):
     """A model whose pressure is off the measured one, and what it is from that one on."""
+
+    key: ClassVar[str] = "by_pressure"
 
     off_pa: float
     of_friction: float

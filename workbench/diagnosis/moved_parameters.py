@@ -7,7 +7,7 @@ in for, by their files' `CONFOUNDED`. What a positioner is set to is a guess to 
 
 from collections.abc import Mapping
 from dataclasses import dataclass
-from typing import Any
+from typing import Any, ClassVar
 
 from config.drive import Kind
 from config.valve_file import ValveFile
@@ -41,6 +41,8 @@ class Moved:
 @dataclass(frozen=True, slots=True, repr=False)
 class MovedParameters(Doubt):
     """All of them."""
+
+    key: ClassVar[str] = "moved"
 
     moved: tuple[Moved, ...]
 

@@ -9,7 +9,7 @@ does not follow the command, as |e| of a third of its own changes shows, there i
 
 from dataclasses import dataclass
 from itertools import permutations
-from typing import Any
+from typing import Any, ClassVar
 
 import numpy as np
 
@@ -25,6 +25,8 @@ from workbench.imports.cell_units import ATMOSPHERE_PA
 @dataclass(frozen=True, slots=True, repr=False)
 class PressureScale(Doubt):
     """How a measured pressure stands to its command, where that is not one to one."""
+
+    key: ClassVar[str] = "pressure_scale"
 
     span: float
     """c."""
