@@ -20,7 +20,7 @@ were found there. What the pressure's noise makes of friction is none: its play,
 is left with friction (`play_of_error`). Where that does not tell, the set point is asked alone.
 """
 
-from collections.abc import Callable, Mapping
+from collections.abc import Callable, Collection, Mapping
 from dataclasses import dataclass
 from functools import partial
 from typing import Literal, NamedTuple
@@ -59,7 +59,7 @@ class PositionerOrPacking(Brief):
     play_m: float
     """What friction alone leaves unanswered, 2 F_c / k_s."""
     found_twice: bool
-    """Whether a second search came as low."""
+    """Whether a second search came as low; its parameters may differ in what the recording does not determine."""
     with_friction_m: float | None = None
     """Held-out rms error from the measured pressure; None where none was measured, and all are from the set point."""
     at_floor: bool = True
@@ -149,24 +149,24 @@ def _asked(
     positioner = positioner_of(banded.valve).name
     dead_band = f"{positioner}.{DEAD_BAND}"
 
+    def otherwise(found: Fit, valve: ValveFile, kept: Collection[str], done: float) -> Fit:
+        free = [each for each in found.parameters if each not in kept]
+        return refit(valve, from_pressure=found.from_pressure, free=free, progress=lambda part: tell(done + 0.3 * part))
+
     def with_friction(n: float, done: float) -> Fit:
-        free = [each for each in stem.parameters if each not in FREE]
-        valve = _with_friction(stem.valve, n)
-        return refit(valve, from_pressure=stem.from_pressure, free=free, progress=lambda part: tell(done + 0.3 * part))
+        return otherwise(stem, _with_friction(stem.valve, n), FREE, done)
 
     def with_dead_band(m: float, done: float) -> Fit:
-        free = [each for each in banded.parameters if each != dead_band]
-        valve = _with(banded.valve, positioner, {DEAD_BAND: m})
-        return refit(valve, free=free, progress=lambda part: tell(done + 0.3 * part))
+        return otherwise(banded, _with(banded.valve, positioner, {DEAD_BAND: m}), (dead_band,), done)
 
-    valve, band_m = stem.valve.valve, _value(banded, dead_band)
+    valve, band_m = stem.valve.valve, banded.parameters[dead_band].value
     n_per_m = 0.5 * valve.spring_n_per_m
     play_m = valve.coulomb_n / n_per_m if n_per_m else 0.0
     friction = _worth(with_friction(DIAGNOSIS.friction_left * valve.coulomb_n, 0.0), stem, split)
     band = _worth(with_dead_band(0.0, 0.3), banded, split)
     if stem.from_pressure and play_m < DIAGNOSIS.play_of_error * friction.with_m:
         friction = friction._replace(gain=NOTHING)
-    found = cause(friction.gain, band.gain) if _found_twice(banded) else "not told"
+    found = cause(friction.gain, band.gain) if banded.trusted else "not told"
     # What was fitted may speak for the other, though what was held out does not: then it is not said to be none.
     share = DIAGNOSIS.other_cause
     if found == "packing" and (
@@ -187,7 +187,7 @@ def _asked(
         valve.coulomb_n,
         band_m,
         play_m,
-        _found_twice(banded),
+        banded.trusted,
         friction.with_m if stem.from_pressure else None,
         band.at_floor,
     )
@@ -247,12 +247,3 @@ def _with_friction(valve: ValveFile, coulomb_n: float) -> ValveFile:
     return valve.model_copy(
         update={"valve": base.model_copy(update={"coulomb_n": coulomb_n, "static_n": static_n})},
     )
-
-
-def _found_twice(found: Fit) -> bool:
-    """Whether a second search came as low; its parameters may differ in what the recording does not determine."""
-    return found.trusted
-
-
-def _value(found: Fit, name: str) -> float:
-    return found.parameters[name].value

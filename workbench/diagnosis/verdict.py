@@ -55,14 +55,14 @@ def verdict(
 def _verdict_of_all(best: EvaluatedModel, steps: Sequence[EffectStep], motion_std_m: float) -> Verdict:
     equivalent = by_another_name(steps)
     best = equivalent.model if equivalent and equivalent.model and equivalent.model.explained else best
-    if best.explained and not best.errors.follows(motion_std_m):
+    if not best.explained:
+        return "unexplained" if best.fit.trusted else "untrusted"
+    if not best.errors.follows(motion_std_m):
         return "unexplained"
     added = [step for step in steps if step.added]
-    if best.explained and not added:
+    if not added:
         return "adequate"
-    if best.explained:
-        return "one_of" if any(len(step.indistinguishable) > 1 for step in added) else "missing"
-    return "unexplained" if best.fit.trusted else "untrusted"
+    return "one_of" if any(len(step.indistinguishable) > 1 for step in added) else "missing"
 
 
 def by_another_name(steps: Sequence[EffectStep]) -> EffectCandidate | None:

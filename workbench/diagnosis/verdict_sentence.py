@@ -17,7 +17,6 @@ from workbench.select.block_errors import NOISE_KNOWN_TO, BlockErrors
 from workbench.select.effect_acceptance import LEAST_BIC
 from workbench.select.effect_candidates import EffectCandidate, EffectStep, EvaluatedModel
 from workbench.select.equivalence import classes, distinguishing_record
-from workbench.select.pressure_errors import PressureErrors
 
 OF_COMMAND = "the floor is the repeatability under the command; driven by the measured pressure, less may be left"
 BREAKS_ELSEWHERE = " The stem breaks loose at other loads than this model has."
@@ -66,14 +65,11 @@ def _said(
     if verdict == "adequate":
         said = _adequate(best.errors, parts, length, given)
         return said + suspicion + _scatter(parts, length)
-    if verdict == "missing":
-        said = f"Missing: {names}; {fell}, and {_left(best.errors, parts, steps[-1].suspected)}."
-        return said + by_pressure + suspicion
-    if verdict == "one_of":
-        all_known = _floors_left(best.errors, parts) <= NOISE_KNOWN_TO
+    if verdict in ("missing", "one_of"):
+        all_known = verdict == "one_of" and _floors_left(best.errors, parts) <= NOISE_KNOWN_TO
         left = "" if all_known else f", and {_left(best.errors, parts, steps[-1].suspected)}"
-        said = f"Missing: {names}{or_another}; {fell}{left}.{apart}{by_pressure}"
-        return said + suspicion
+        rivals = apart if verdict == "one_of" else ""
+        return f"Missing: {names}{or_another}; {fell}{left}.{rivals}{by_pressure}{suspicion}"
     several = sum(step.added is not None for step in steps) > 1
     lowers, explains = ("lower", "explain") if several else ("lowers", "explains")
     part = f"{lowers} it" if verdict in ("unjudged", "unfinished") else f"{explains} a part"
@@ -94,22 +90,13 @@ def _tells(candidate: EffectCandidate) -> bool:
 
 def floor_by_pressure(parts: Split, kind: Kind) -> list[str]:
     """Say, of a stem that is driven by its measured pressure, what the floor has of that."""
-    scatter, word = parts.by_pressure, kind.command.word
-    said = [kind.text(OF_COMMAND)] if parts.repeats else []
+    scatter, about = parts.by_pressure, f"the noise of the measured {kind.command.word}"
     if scatter is None:
-        return [
-            *said,
-            kind.text(f"the noise of the measured {word} does not show at rest, and is not part of the floor"),
-        ]
-    moved = kind.length.said(scatter.typical_m, ".2g")
-    noise = kind.command.read.said(scatter.noise_pa, ".2g")
-    return [
-        *said,
-        kind.text(
-            f"the noise of the measured {word}, {noise}, moves the stem by {moved} in a typical second; this is part "
-            "of the floor"
-        ),
-    ]
+        about += " does not show at rest, and is not part of the floor"
+    else:
+        noise, moved = kind.command.read.said(scatter.noise_pa, ".2g"), kind.length.said(scatter.typical_m, ".2g")
+        about += f", {noise}, moves the stem by {moved} in a typical second; this is part of the floor"
+    return [kind.text(each) for each in ((OF_COMMAND, about) if parts.repeats else (about,))]
 
 
 def _no_break_away(found: Fit) -> str:
@@ -158,9 +145,8 @@ def _left(errors: BlockErrors, parts: Split, suspected: Sequence[EffectCandidate
     floors = _floors_left(errors, parts)
     if floors <= NOISE_KNOWN_TO:
         return "nothing is left to explain"
-    if suspected:
-        return f"{floors:.2g} times the floor is left, which no other effect is proved to explain"
-    return f"{floors:.2g} times the floor is left, which no other effect here explains"
+    explains = "is proved to explain" if suspected else "here explains"
+    return f"{floors:.2g} times the floor is left, which no other effect {explains}"
 
 
 def _unproved(
@@ -207,17 +193,17 @@ def rivals_sentence(names: Sequence[str], library: Mapping[str, Effect]) -> str:
 def _by_pressure(step: EffectStep, kind: Kind) -> str:
     """Say what the measured pressure speaks against, with a leading space; empty where it need not be asked."""
     added = step.added and step.added.model and step.added.model.pressure
-    off = [f"{each.name}'s by {kind.command.read.said(of.rms_pa)}" for each in step.contradicted if (of := _of(each))]
+    off = [
+        f"{each.name}'s by {kind.command.read.said(of.rms_pa)}"
+        for each in step.contradicted
+        if each.model and (of := each.model.pressure)
+    ]
     if not added or not step.added or not off:
         return ""
     return (
         f" The measured {kind.command.word} tells them apart: {step.added.name}'s is off by "
         f"{kind.command.read.said(added.rms_pa)} rms, {', '.join(off)}."
     )
-
-
-def _of(candidate: EffectCandidate) -> PressureErrors | None:
-    return candidate.model.pressure if candidate.model else None
 
 
 def _suspicion(suspected: Sequence[EffectCandidate]) -> str:
