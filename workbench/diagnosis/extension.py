@@ -25,6 +25,7 @@ from workbench.fit.fitting import fit
 from workbench.fit.parameter_estimate import parameter_table
 from workbench.select.block_errors import BlockErrors, block_errors
 from workbench.select.effect_acceptance import Gain, gain
+from workbench.select.effect_candidates import EvaluatedModel
 from workbench.select.pressure_scatter import with_pressure_scatter
 
 if TYPE_CHECKING:
@@ -184,32 +185,27 @@ def extend(
     there_already = diagnosis.fit_with(effects) if diagnosis and effects else None
     if there_already is not None and there_already.cost < after.cost:
         after = there_already
-    before_errors = block_errors(before, on)
-    given = AsGiven.of(valve, on, before).errors
-    return Extension(
-        effects=tuple(effects),
-        given_train_rmse_m=given.train_rmse_m,
-        given_test_rmse_m=given.test_rmse_m,
-        refitted=before,
-        refitted_errors=before_errors,
-        extended=after,
-        extended_errors=(after_errors := block_errors(after, on) if effects else before_errors),
-        gain=gain(before, after, before_errors, after_errors),
-        split=on,
-    )
+    refitted = EvaluatedModel(before, block_errors(before, on), on.floor_m)
+    extended = EvaluatedModel(after, block_errors(after, on), on.floor_m) if effects else refitted
+    return _extension(tuple(effects), AsGiven.of(valve, on, before), refitted, extended, on)
 
 
 def extension_of(diagnosis: Diagnosis) -> Extension:
     """Return what a diagnosis has added to the valve that it began with; nothing is fitted again."""
-    before, after, given = diagnosis.base, diagnosis.best, diagnosis.given.errors
+    return _extension(diagnosis.missing, diagnosis.given, diagnosis.base, diagnosis.best, diagnosis.split)
+
+
+def _extension(
+    effects: tuple[str, ...], given: AsGiven, before: EvaluatedModel, after: EvaluatedModel, on: Split
+) -> Extension:
     return Extension(
-        effects=diagnosis.missing,
-        given_train_rmse_m=given.train_rmse_m,
-        given_test_rmse_m=given.test_rmse_m,
+        effects=effects,
+        given_train_rmse_m=given.errors.train_rmse_m,
+        given_test_rmse_m=given.errors.test_rmse_m,
         refitted=before.fit,
         refitted_errors=before.errors,
         extended=after.fit,
         extended_errors=after.errors,
         gain=gain(before.fit, after.fit, before.errors, after.errors),
-        split=diagnosis.split,
+        split=on,
     )
