@@ -16,10 +16,11 @@ from workbench.data.record import ready
 from workbench.fit.ends import search_about
 from workbench.fit.fit_problem import problem
 from workbench.fit.fit_result import Counted, terms
+from workbench.fit.fit_thresholds import FIT, Effort
 from workbench.fit.fitting import fit
 from workbench.fit.likelihood import Groups, Likelihood, soft
-from workbench.fit.minimiser import Effort, End, derivatives, descend
-from workbench.fit.uncertainty import RISE_95, uncertainty
+from workbench.fit.minimiser import End, derivatives, descend
+from workbench.fit.uncertainty import uncertainty
 
 DRAWS = 100
 TELL = 6
@@ -102,7 +103,7 @@ def test_each_landing_break_away_and_parameter_that_moved_is_one_witness(like: L
     """Samples in motion hang together and count for fewer; a rest is one, however long."""
     groups = like.at(like.composition.theta, like.run.first_onsets_s())
     counted = Counted(groups, like.layout.rest_of, len(like.moves))
-    found = terms(like, counted, np.array([0.3, -2.0, 1.0]))
+    found = terms(counted, np.array([0.3, -2.0, 1.0]))
     assert found.landings.independent == groups.landings.size
     assert found.break_aways.independent == groups.break_aways.size
     assert found.moved.independent == 3
@@ -131,14 +132,14 @@ def test_an_end_is_believed_where_no_place_that_it_leaves_open_leads_lower(like:
     begun = replace(stopped, jacobian=derivatives(like, stopped.z, stopped.onsets_s))
     found = search_about(like, begun)
     assert found.cost < begun.cost - 1.0
-    assert all(other.cost < found.cost + RISE_95 for other in found.as_likely)
+    assert all(other.cost < found.cost + FIT.intervals.rise_nats for other in found.as_likely)
     assert search_about(like, begun).cost == found.cost, "the places drawn are the same each time"
 
 
 def test_an_interval_reaches_over_another_end_that_is_as_likely(like: Likelihood) -> None:
     end = descend(like, like.coordinates(like.composition.theta))
     alone = uncertainty(like, end)
-    other = replace(end, z=end.z + 3.0 * alone.std, cost=end.cost + 0.5 * RISE_95)
+    other = replace(end, z=end.z + 3.0 * alone.std, cost=end.cost + 0.5 * FIT.intervals.rise_nats)
     both = uncertainty(like, replace(end, as_likely=(other,)))
     assert both.upper[0] > other.z[0]
     assert both.lower[0] == alone.lower[0]

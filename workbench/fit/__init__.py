@@ -3,6 +3,7 @@
 Its files:
 
     fitting             puts it together
+    fit_thresholds      every number by which it decides something
     fit_problem         a record to be explained, made once
     likelihood          where the stem is, told when it moves, and what it takes to break it loose
     minimiser           lowers its cost

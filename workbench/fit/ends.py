@@ -3,47 +3,22 @@
 The cost has edges, where a stem just sticks or just does not, and a descent may stay on one. An end is believed when
 descents from places drawn from what it leaves open come to nothing lower (iterated local search):
 
-    dz ~ N(0, S^2 C),   do = -D^-1 C_o' dz      C as of `uncertainty`, S = `spread`; onsets o follow
+    dz ~ N(0, S^2 C),   do = -D^-1 C_o' dz      C as of `uncertainty`, S = `spread_deviations`; onsets o follow
 
 H = [A, C_o; C_o', D] by coordinates and onsets as of `minimiser`. Of each round's draws the cheapest is descended from.
 Ends that cost no more than 1.92 above the least belong to the interval of 95 %, however narrow the curvature there.
 """
 
-from dataclasses import dataclass, replace
+from dataclasses import replace
 
 import numpy as np
 
 from sim.karnopp import Vector
+from workbench.fit.fit_thresholds import FIT
 from workbench.fit.likelihood import Likelihood, coupling, soft_weight
-from workbench.fit.minimiser import DAMPING, NO_SLOPE, End, descend
-from workbench.fit.onsets import SEARCH as ONSETS
+from workbench.fit.minimiser import End, descend
 from workbench.fit.onsets import with_onsets
-from workbench.fit.uncertainty import RISE_95, uncertainty
-
-SETTLE_ROUNDS = 5
-"""Rounds of onsets and coordinates at most: two take nearly all."""
-NATS = 1.0
-"""Cost within which two ends are one."""
-
-
-@dataclass(frozen=True, slots=True, kw_only=True)
-class Places:
-    """How places are drawn about an end."""
-
-    seed: int = 1
-    draws: int = 32
-    """Of a round: one simulation each; sixteen left a play among few slips in a worse valley."""
-    spread: float = 1.5
-    """Deviations: the next valley lies beyond what this one leaves open, but not far."""
-    vain: int = 2
-    """Rounds in a row that come to nothing lower, after which an end is believed."""
-    rounds: int = 6
-    """At most."""
-    gain: float = 0.1
-    """Nats by which an end is lower than another: a third of a deviation."""
-
-
-PLACES = Places()
+from workbench.fit.uncertainty import uncertainty
 
 
 def settle(like: Likelihood, end: End) -> tuple[End, ...]:
@@ -60,9 +35,9 @@ def settle(like: Likelihood, end: End) -> tuple[End, ...]:
 
 def _settle_by(like: Likelihood, end: End) -> End:
     """Search on where other onsets suit the valve better than those that a search came to, as long as it pays."""
-    for _ in range(SETTLE_ROUNDS):
+    for _ in range(FIT.ends.settle_rounds):
         onsets_s, groups = with_onsets(like, like.theta(end.z))
-        if like.cost(groups.whole) > end.cost - NATS:
+        if like.cost(groups.whole) > end.cost - FIT.ends.same_nats:
             break
         there = descend(like, end.z, onsets_s)
         end = min(end, there, key=lambda each: each.cost)
@@ -71,22 +46,22 @@ def _settle_by(like: Likelihood, end: End) -> End:
 
 def search_about(like: Likelihood, end: End) -> End:
     """Search on from places that the record leaves open about an end, until none leads lower; with all as likely."""
-    generator, vain, ends = np.random.default_rng(PLACES.seed), 0, [end]
+    generator, vain, ends = np.random.default_rng(1), 0, [end]
     root, follow = uncertainty(like, end).root, _onsets_by_z(like, end)
-    for _ in range(PLACES.rounds):
-        if vain == PLACES.vain or not end.z.size:
+    for _ in range(FIT.ends.most_rounds):
+        if vain == FIT.ends.vain_rounds or not end.z.size:
             break
         z, onsets_s = _cheapest(like, end, root, follow, generator)
         there = descend(like, z, onsets_s)
-        if there.cost < end.cost + NATS:
+        if there.cost < end.cost + FIT.ends.same_nats:
             there = _settle_by(like, there)
         ends.append(there)
-        if there.cost < end.cost - PLACES.gain:
+        if there.cost < end.cost - FIT.ends.gain_nats:
             end, vain = there, 0
             root, follow = uncertainty(like, end).root, _onsets_by_z(like, end)
         else:
             vain += 1
-    as_likely = tuple(each for each in ends if each is not end and each.cost < end.cost + RISE_95)
+    as_likely = tuple(each for each in ends if each is not end and each.cost < end.cost + FIT.intervals.rise_nats)
     return replace(end, as_likely=as_likely)
 
 
@@ -95,10 +70,12 @@ def _cheapest(
 ) -> tuple[Vector, Vector]:
     """Return the coordinates and onsets, s, of the cheapest of some places drawn about an end."""
     ends = np.array([each.bounds for each in like.parameters])
-    normal = generator.standard_normal((PLACES.draws, end.z.size))
-    steps = np.clip(PLACES.spread * np.linalg.lstsq(root, normal.T)[0].T, -DAMPING.longest, DAMPING.longest)
+    normal = generator.standard_normal((FIT.ends.draws, end.z.size))
+    steps = np.clip(
+        FIT.ends.spread_deviations * np.linalg.lstsq(root, normal.T)[0].T, -FIT.damping.longest, FIT.damping.longest
+    )
     places = np.clip(end.z + steps, ends[:, 0], ends[:, 1])
-    earliest_s, latest_s = like.run.bounds_s(ONSETS.reach)
+    earliest_s, latest_s = like.run.bounds_s(FIT.onsets.reach_periods)
     onsets_s = [
         np.clip(end.onsets_s + like.run.period_s * np.clip(follow @ (z - end.z), -1.0, 1.0), earliest_s, latest_s)
         for z in places
@@ -111,6 +88,6 @@ def _cheapest(
 def _onsets_by_z(like: Likelihood, end: End) -> Vector:
     """Return by how many periods the best onsets move with each coordinate, (moves, parameters)."""
     by_z, by_onset = np.hsplit(end.jacobian, [end.z.size])
-    weight = soft_weight(end.groups.whole, like.weights.soft)
+    weight = soft_weight(end.groups.whole)
     C_o, D = coupling(like.move_of, by_z, by_onset.sum(axis=1), weight, len(like.moves))
-    return np.asarray(-np.where(D > NO_SLOPE, C_o / np.maximum(D, NO_SLOPE), 0.0).T)
+    return np.asarray(-np.where(FIT.nothing < D, C_o / np.maximum(D, FIT.nothing), 0.0).T)

@@ -8,13 +8,12 @@ from config.valve_file import ValveParameters
 from sim.composition import BASE, SPRING, Composition
 from sim.effect import Effect
 from workbench.data.record import Record, require_units
-from workbench.fit.likelihood import WEIGHTS, Likelihood
+from workbench.fit.fit_thresholds import FIT
+from workbench.fit.likelihood import Likelihood
 from workbench.model.search_coordinates import AT_REST, BEHIND_POSITIONER, DEFAULT, LANDED, Parameter, free_parameters
 from workbench.model.simulation_regime import NO_LANDING, Motion, Sampling, sampling
 from workbench.model.told_run import ToldMove, told_moves
 
-LEAST_MOVES = 2
-"""Moves of the stem, one each way: two slow ramps tell the balance of forces all along; two steps leave it wide."""
 NO_REST = (
     "the stem creeps or moves throughout, and does not rest between moves, so that friction does not show; record "
     "steps that are held until it rests"
@@ -113,7 +112,10 @@ def problem(
     require_units(record, valve)
     told = told_moves(record)
     by = by or sampling(record, valve)
-    load_n = max(WEIGHTS.break_away * valve.spring_n_per_m * record.scale_m, WEIGHTS.load * valve.coulomb_n)
+    load_n = max(
+        FIT.weights.break_away_noises * valve.spring_n_per_m * record.scale_m,
+        FIT.weights.load_of_friction * valve.coulomb_n,
+    )
     found = Problem(record, told, by, from_pressure, load_n)
     if not (found.by_setpoint and told and all(each.never_rests for each in told)):  # a loop shows what holds it
         _require_motion(record, told, NO_LANDING if by.slow else NO_REST)
@@ -121,11 +123,11 @@ def problem(
 
 
 def _require_motion(record: Record, told: Sequence[ToldMove], no_rest: str) -> None:
-    if len(told) < LEAST_MOVES and 2 * sum(each.after - each.before for each in told) > len(record):
+    if len(told) < FIT.fewest_moves and 2 * sum(each.after - each.before for each in told) > len(record):
         raise InputError("recording", no_rest)
-    if len(told) < LEAST_MOVES:
+    if len(told) < FIT.fewest_moves:
         raise InputError(
-            "recording", f"the stem moves {len(told)} times, at least {LEAST_MOVES} are needed to fit anything"
+            "recording", f"the stem moves {len(told)} times, at least {FIT.fewest_moves} are needed to fit anything"
         )
     ways = {record.position_m[each.after] > record.position_m[each.before] for each in told}
     if len(ways) < 2:

@@ -21,23 +21,17 @@ from workbench.compare.measures import fit_percent
 from workbench.data.noise_floor import say_m
 from workbench.data.record import Record, ready
 from workbench.fit.fit_problem import Problem
+from workbench.fit.fit_thresholds import FIT
 from workbench.fit.likelihood import Groups, Likelihood, Rows, soft
 from workbench.fit.minimiser import End
 from workbench.fit.parameter_estimate import Fitted, draw_parameters, parameter_columns, parameter_table
-from workbench.fit.uncertainty import RISE_95, Combination, Uncertainty, uncertainty
+from workbench.fit.uncertainty import Combination, Uncertainty, uncertainty
 from workbench.model.free_run import FreeRun
 from workbench.model.search_coordinates import Parameter
 from workbench.model.simulation_regime import DYNAMIC, Sampling
 
 if TYPE_CHECKING:
     from matplotlib.figure import Figure
-
-AT_BOUND = 1e-3
-"""Of a coordinate's range, within which it is at the end of it."""
-TRIED_STATIC = 13
-"""Values of static friction in its interval: the free run is the same between the break-aways that each brings."""
-WANTS_OUT = 2.0
-"""Deviations from the end of a range to where the cost would be least: the record wants the parameter beyond it."""
 
 
 class Term(NamedTuple):
@@ -234,7 +228,7 @@ def _as_runs_freely(like: Likelihood, end: End, determined: Uncertainty) -> End:
         return end
     (i,) = rows
     low, high = like.parameters[i].bounds
-    open_ = np.linspace(max(low, determined.lower[i]), min(high, determined.upper[i]), TRIED_STATIC)
+    open_ = np.linspace(max(low, determined.lower[i]), min(high, determined.upper[i]), FIT.intervals.static_values)
     run = FreeRun(like.composition, like.record, from_pressure=like.from_pressure, by=like.by)
     seen_m = np.where(like.record.valid, like.record.position_m, np.nan)
 
@@ -246,7 +240,7 @@ def _as_runs_freely(like: Likelihood, end: End, determined: Uncertainty) -> End:
     def cost(z: Vector) -> float:
         return like.cost(like.at(like.theta(z), end.onsets_s).whole)
 
-    trials = [end.z, *(each for each in map(placed, open_) if cost(each) <= end.cost + RISE_95)]
+    trials = [end.z, *(each for each in map(placed, open_) if cost(each) <= end.cost + FIT.intervals.rise_nats)]
     errors = [np.nanmean((run.position_m(like.theta(z)) - seen_m) ** 2) for z in trials]
     best = trials[int(np.nanargmin(errors))] if np.isfinite(errors).any() else end.z
     groups = like.at(like.theta(best), end.onsets_s)
@@ -261,37 +255,37 @@ class Counted(NamedTuple):
     moves: int
 
 
-def terms(like: Likelihood, counted: Counted, moved: Vector | None = None) -> Terms:
+def terms(counted: Counted, moved: Vector | None = None) -> Terms:
     """Return what the residuals say, kind by kind; and how far the parameters had to go for them, in deviations.
 
     Samples in motion that hang together count for fewer, a move for one witness at the least; landings and break-aways
     are as many as they are. A rest is one witness, however long: one that a model gets wrong is one event.
     """
-    scale, (motion, landings, rests, break_aways) = like.weights.soft, counted.groups
+    motion, landings, rests, break_aways = counted.groups
     return Terms(
-        _term(motion, scale, max(independent_share(motion) * motion.size, counted.moves)),
-        _term(landings, scale, landings.size),
-        _term_of_rests(rests, counted.rest_of, scale),
-        _term(break_aways, scale, break_aways.size),
-        NO_TERM if moved is None else _term(moved, scale, moved.size),
+        _term(motion, max(independent_share(motion) * motion.size, counted.moves)),
+        _term(landings, landings.size),
+        _term_of_rests(rests, counted.rest_of),
+        _term(break_aways, break_aways.size),
+        NO_TERM if moved is None else _term(moved, moved.size),
     )
 
 
 def terms_of_all(like: Likelihood, groups: Groups) -> Terms:
     """Return what all residuals of a likelihood say."""
-    return terms(like, Counted(groups, like.layout.rest_of, len(like.moves)))
+    return terms(Counted(groups, like.layout.rest_of, len(like.moves)))
 
 
-def _term(r: Vector, scale: float, independent: float) -> Term:
-    return Term(independent, max(1.0, 2.0 * float(soft(r, scale).mean()))) if r.size else NO_TERM
+def _term(r: Vector, independent: float) -> Term:
+    return Term(independent, max(1.0, 2.0 * float(soft(r).mean()))) if r.size else NO_TERM
 
 
-def _term_of_rests(r: Vector, rest_of: Rows, scale: float) -> Term:
+def _term_of_rests(r: Vector, rest_of: Rows) -> Term:
     """Return the term of rests: the geometric mean of the mean squares of each."""
     if not r.size:
         return NO_TERM
     _, of = np.unique(rest_of, return_inverse=True)
-    squares = np.bincount(of, 2.0 * soft(r, scale)) / np.bincount(of)
+    squares = np.bincount(of, 2.0 * soft(r)) / np.bincount(of)
     return Term(float(squares.size), float(np.exp(np.mean(np.log(np.maximum(squares, 1.0))))))
 
 
@@ -304,12 +298,17 @@ def _fitted(like: Likelihood, end: End, determined: Uncertainty, i: int) -> Fitt
         return float(like.theta(there)[parameter.index])
 
     low, high = parameter.bounds
-    near = AT_BOUND * (high - low)
+    near = FIT.intervals.bound_of_range * (high - low)
     at_low, at_high = bool(z[i] < low + near), bool(z[i] > high - near)
     outward = -determined.off[i] if at_low else determined.off[i] if at_high else 0.0
     by_z = (value(z[i] + 1e-6) - value(z[i] - 1e-6)) / 2e-6
     lower = value(max(low, float(determined.lower[i]))) if np.isfinite(determined.lower[i]) else -np.inf
     upper = value(min(high, float(determined.upper[i]))) if np.isfinite(determined.upper[i]) else np.inf
     return Fitted(
-        value(z[i]), abs(by_z) * float(determined.std[i]), lower, upper, at_low or at_high, bool(outward <= WANTS_OUT)
+        value(z[i]),
+        abs(by_z) * float(determined.std[i]),
+        lower,
+        upper,
+        at_low or at_high,
+        bool(outward <= FIT.intervals.out_deviations),
     )

@@ -19,11 +19,12 @@ from sim.effect import Effect, find_effects
 from sim.karnopp import Vector
 from workbench.data.record import Record, ready, require_few_samples
 from workbench.data.stretches import informative
-from workbench.fit.ends import NATS, search_about, settle
+from workbench.fit.ends import search_about, settle
 from workbench.fit.fit_problem import Problem, problem
 from workbench.fit.fit_result import Fit, Terms, fit_at, terms_of_all
+from workbench.fit.fit_thresholds import FIT, Effort
 from workbench.fit.likelihood import Likelihood
-from workbench.fit.minimiser import COARSE, GLIMPSE, WHOLE, Effort, End, begin_by_landings, derivatives, descend
+from workbench.fit.minimiser import End, begin_by_landings, derivatives, descend
 from workbench.fit.onsets import with_onsets
 from workbench.fit.starts import (
     Origin,
@@ -41,14 +42,6 @@ from workbench.model.simulation_regime import DYNAMIC, MOST_WITH_INERTIA, Motion
 from workbench.model.told_run import told_moves
 
 Progress = Callable[[float], None]
-AT_THE_NOISE = 1.3
-"""Cost over half the number of residuals, up to which nothing is left that another start might find."""
-NEAR = 2.0
-"""Factor on the cost of the best valley, within which another is searched to its end, too."""
-COARSE_ROUNDS = 2
-"""Of parabolas for onsets from which a coarse search begins: it moves them itself."""
-SAME_COST = 1.01
-"""Factor on the cost, and `NATS` besides, within which two searches have come to the same."""
 
 
 @linear_algebra_alone()
@@ -209,22 +202,22 @@ def glimpse(
     searches: list[Callable[[], End]] = []
     if like.run.hidden:  # friction stands in for a play where slides land: landings do not choose its width
         begins = strewn_starts(like, added, fitted, points)
-        searches += [lambda z=z: _from_afar(like, z, GLIMPSE) for z in begins]  # type: ignore[misc]
+        searches += [lambda z=z: _from_afar(like, z, FIT.descent.glimpse) for z in begins]  # type: ignore[misc]
     else:
         near = near_start(like, added, fitted, points)
-        searches.append(lambda: descend(like, near, base.onsets_s, GLIMPSE))
+        searches.append(lambda: descend(like, near, base.onsets_s, FIT.descent.glimpse))
         if not at_the_noise(base.cost, base.count):
             chosen = partial(with_strengths, like, added, points=points)
             begins = starts_by_landings(like, added, fitted, Origin(sheet), points)
-            searches += [lambda z=z: _from_afar(like, z, GLIMPSE, chosen) for z in begins]  # type: ignore[misc]
+            searches += [lambda z=z: _from_afar(like, z, FIT.descent.glimpse, chosen) for z in begins]  # type: ignore[misc]
     ends = list(on_threads(lambda search: search(), searches, workers))
     if like.cost(without.whole) < min((each.cost for each in ends), default=inf):  # an own effect may declare no start
-        ends.append(descend(like, off, base.onsets_s, GLIMPSE))
+        ends.append(descend(like, off, base.onsets_s, FIT.descent.glimpse))
     best = _cheapest(ends)
     other_order = in_other_order(like, best.z)
     if other_order is not None and not at_the_noise(best.cost, like.count):
-        onsets_s, _ = with_onsets(like, like.theta(other_order), COARSE_ROUNDS)
-        ends.append(descend(like, other_order, onsets_s, GLIMPSE))
+        onsets_s, _ = with_onsets(like, like.theta(other_order), FIT.onsets.coarse_rounds)
+        ends.append(descend(like, other_order, onsets_s, FIT.descent.glimpse))
     return Trial(whole, tuple(sorted(ends, key=lambda each: each.cost)), terms_of_all(like, without))
 
 
@@ -232,9 +225,9 @@ def glimpse(
 def advance(trial: Trial) -> Trial:
     """Search on in the best valley of a trial, and in the next best if that leaves something."""
     like, (first, *others) = trial.like.eased, trial.valleys
-    ends = [descend(like, first.z, first.onsets_s, COARSE)]
-    if not at_the_noise(ends[0].cost, like.count) and others and others[0].cost < NEAR * first.cost:
-        ends.append(descend(like, others[0].z, others[0].onsets_s, COARSE))
+    ends = [descend(like, first.z, first.onsets_s, FIT.descent.coarse)]
+    if not at_the_noise(ends[0].cost, like.count) and others and others[0].cost < FIT.ends.near_cost * first.cost:
+        ends.append(descend(like, others[0].z, others[0].onsets_s, FIT.descent.coarse))
     valleys = sorted((*ends, *others[len(ends) - 1 :]), key=lambda each: each.cost)
     return replace(trial, valleys=tuple(valleys))
 
@@ -256,7 +249,7 @@ class Settled:
 def settled(trial: Trial) -> Settled:
     """Search to the end from the best valley of a trial, and from the next if it is nearly as good."""
     like, (first, *others) = trial.like, trial.valleys
-    near = [first, *(each for each in others[:1] if each.cost < NEAR * first.cost)]
+    near = [first, *(each for each in others[:1] if each.cost < FIT.ends.near_cost * first.cost)]
     found = [settle(like, descend(like.eased, each.z, each.onsets_s)) for each in near]
     return Settled(like, tuple(end for ends in found for end in ends))
 
@@ -264,7 +257,7 @@ def settled(trial: Trial) -> Settled:
 @linear_algebra_alone()
 def finish(of: Problem, found: Settled, rival_cost: float = inf) -> Fit:
     """Return the fit of the best end; its neighbourhood is searched, too, unless a rival's cost is far below."""
-    return _best(of, found.like, found.ends, is_near=found.cost < NEAR * rival_cost)
+    return _best(of, found.like, found.ends, is_near=found.cost < FIT.ends.near_cost * rival_cost)
 
 
 @linear_algebra_alone()
@@ -329,19 +322,19 @@ def _scale(base: Fit, known: ValveParameters) -> ValveParameters:
 def _from_afar(
     like: Likelihood,
     z: Vector,
-    effort: Effort = WHOLE,
+    effort: Effort = FIT.descent.whole,
     chosen: Callable[[Vector], Vector] = lambda landed: landed,
 ) -> End:
     """Search from a place of which nothing is known: landings first, then what acts in time, onsets, and all."""
     landed = chosen(begin_by_landings(like, z))
-    rounds = None if effort == WHOLE else COARSE_ROUNDS
+    rounds = None if effort == FIT.descent.whole else FIT.onsets.coarse_rounds
     onsets_s, _ = with_onsets(like, like.theta(landed), rounds)
     return descend(like, landed, onsets_s, effort)
 
 
 def at_the_noise(cost: float, count: int) -> bool:
     """Whether the cost of so many residuals leaves nothing that another start might find."""
-    return cost <= AT_THE_NOISE * 0.5 * count
+    return cost <= FIT.ends.at_the_noise * 0.5 * count
 
 
 def _best(of: Problem, like: Likelihood, ends: Sequence[End], *, is_near: bool = True) -> Fit:
@@ -349,9 +342,13 @@ def _best(of: Problem, like: Likelihood, ends: Sequence[End], *, is_near: bool =
     laws = [[each for each in ends if each.is_eased == eased] for eased in (False, True)]
     least, best_of = _cheapest(ends).cost, [_cheapest(each) for each in laws if each]
     if is_near:
-        best_of = [search_about(_law(like, each), each) for each in best_of if each.cost <= SAME_COST * least + NATS]
+        best_of = [
+            search_about(_law(like, each), each)
+            for each in best_of
+            if each.cost <= FIT.ends.same_cost * least + FIT.ends.same_nats
+        ]
     best = _cheapest(best_of)
-    same = max(1, sum(each.cost <= SAME_COST * best.cost + NATS for each in laws[best.is_eased]))
+    same = max(1, sum(each.cost <= FIT.ends.same_cost * best.cost + FIT.ends.same_nats for each in laws[best.is_eased]))
     return fit_at(of, _law(like, best), best, same + 1 if at_the_noise(best.cost, like.count) else same)
 
 

@@ -18,23 +18,8 @@ from scipy.optimize import minimize_scalar
 from config.recording import Column
 from signals.moves import moves, rests
 from workbench.data.record import Record
+from workbench.fit.fit_thresholds import FIT
 from workbench.model.search_coordinates import Parameter
-
-ENDS, INSIDE, ASIDE = (0.002, 0.998), (1.0, 4.0, 16.0), 0.1
-"""Quantiles of the positions at their ends; how far inside these, in noises; how far outside, of what is swept."""
-LEAST_REST, FEWEST_RESTS = 8, 6
-MOST_SAMPLES = 500
-"""Samples that stand in for rests."""
-LIKELY_QUANTA = 8
-FINEST, COARSEST = 2.0, 8.0
-"""A quantum is sought from so many noises to the swept positions divided by so many;"""
-FINEST_OF_RESTS = 0.8
-"""in rests, whose noise is less, from so many on."""
-SURE_OF_REST = 60
-"""Samples of a rest from which on it counts no more than another: its noise is no longer what matters."""
-PER_LOBE = 8.0
-OF_DELAYS = (0.5, 0.25, 0.75)
-"""Quantiles of the delays from which searches begin."""
 
 
 def guessed_values(added: Sequence[Parameter], record: Record) -> list[tuple[float, ...]]:
@@ -46,7 +31,7 @@ def guessed_values(added: Sequence[Parameter], record: Record) -> list[tuple[flo
     suggested: list[dict[str, float]] = []
     ends = _ends(added, record)
     if ends is not None:
-        for inside in (inside * record.scale_m for inside in INSIDE):
+        for inside in (FIT.guesses.inside_noises**power * record.scale_m for power in range(3)):
             lower_m, upper_m = ends.lowest_m + inside, ends.highest_m - inside
             stops = ((ends.below_m, upper_m), (lower_m, ends.above_m), (lower_m, upper_m))
             suggested += [{"lowest": lower, "swept": upper - lower} for lower, upper in stops]
@@ -74,8 +59,9 @@ def _ends(added: Sequence[Parameter], record: Record) -> _Ends | None:
     declared = {each.guess: each.starts[0] for each in added if each.guess in ("lowest", "swept")}
     if declared.keys() != {"lowest", "swept"}:
         return None
-    lowest_m, highest_m = np.quantile(record.position_m[record.valid], ENDS).tolist()
-    aside_m = ASIDE * (highest_m - lowest_m)
+    quantile = FIT.guesses.end_quantile
+    lowest_m, highest_m = np.quantile(record.position_m[record.valid], (quantile, 1.0 - quantile)).tolist()
+    aside_m = FIT.guesses.aside_of_swept * (highest_m - lowest_m)
     below_m = min(declared["lowest"], lowest_m - aside_m)
     return _Ends(lowest_m, highest_m, below_m, max(declared["lowest"] + declared["swept"], highest_m + aside_m))
 
@@ -92,28 +78,32 @@ def likely_delays_s(record: Record) -> list[float]:
         after = moved[np.minimum(np.searchsorted(moved, changed), moved.size - 1)]
         before_next = (after >= changed) & (after < np.append(changed[1:], end - first))
         delays += (after - changed)[before_next].tolist()
-    if len(delays) < FEWEST_RESTS:
+    if len(delays) < FIT.guesses.fewest_rests:
         return []
-    likely = np.quantile(delays, OF_DELAYS, method="nearest")
+    likely = np.quantile(delays, (0.5, 0.25, 0.75), method="nearest")
     return [(each - 0.5) * record.period_s for each in dict.fromkeys(likely.tolist()) if each]
 
 
 def likely_quanta_m(record: Record) -> list[float]:
     """Return the steps, m, of which the positions look most to be multiples, of the highest S(q) first."""
     places_m, weights = _rests_m(record)
-    finest = FINEST_OF_RESTS
-    if places_m.size < FEWEST_RESTS:
+    finest = FIT.guesses.finest_of_rests_noises
+    if places_m.size < FIT.guesses.fewest_rests:
         samples_m = record.position_m[record.valid]
-        places_m = samples_m[:: 1 + samples_m.size // MOST_SAMPLES]
-        weights, finest = np.ones(places_m.size), FINEST
+        places_m = samples_m[:: 1 + samples_m.size // FIT.guesses.most_samples]
+        weights, finest = np.ones(places_m.size), FIT.guesses.finest_noises
     swept_m = float(np.ptp(places_m))
-    if swept_m < 2.0 * COARSEST * FINEST * record.scale_m:
+    if swept_m < 2.0 * FIT.guesses.coarsest_of_swept * FIT.guesses.finest_noises * record.scale_m:
         return []
     farthest_m = float(np.abs(places_m).max())
-    frequency = np.arange(COARSEST / swept_m, 1.0 / (finest * record.scale_m), 1.0 / (PER_LOBE * farthest_m))
+    frequency = np.arange(
+        FIT.guesses.coarsest_of_swept / swept_m,
+        1.0 / (finest * record.scale_m),
+        1.0 / (FIT.guesses.steps_a_lobe * farthest_m),
+    )
     height = np.cos(2.0 * np.pi * np.outer(frequency, places_m)) @ weights
     peaks = 1 + np.flatnonzero((height[1:-1] > height[:-2]) & (height[1:-1] >= height[2:]))
-    likeliest = peaks[np.argsort(-height[peaks])[:LIKELY_QUANTA]]
+    likeliest = peaks[np.argsort(-height[peaks])[: FIT.guesses.most_quanta]]
     half = frequency[1] - frequency[0]
     return [1.0 / _summit(float(each), half, places_m, weights) for each in frequency[likeliest]]
 
@@ -133,7 +123,7 @@ def _rests_m(record: Record) -> tuple[Column, Column]:
     for first, end in record.segments:
         position_m = np.where(record.valid, record.position_m, np.nan)[first:end]
         for each in rests(position_m, record.scale_m):
-            if each.end - each.first >= LEAST_REST:
+            if each.end - each.first >= FIT.guesses.fewest_samples:
                 places.append(float(np.nanmedian(position_m[each.first : each.end])))
-                weights.append(min(each.end - each.first, SURE_OF_REST) / SURE_OF_REST)
+                weights.append(min(each.end - each.first, FIT.guesses.sure_samples) / FIT.guesses.sure_samples)
     return np.array(places), np.array(weights)

@@ -8,14 +8,14 @@ First factor. A simulation is told the moves (`workbench.model.told_run`). With 
     r_l = mean(e) / sqrt(sigma^2 / n + tau^2)       a rest of n samples: where the slide landed
     r_b = (mean_b(e) - mean(e)) sqrt(n_b) / sigma   blocks b of n_b samples of it: what still creeps there
 
-sigma the noise, tau = `landing` sigma. Where the sensor of the model rounds to q, a reading L says that x was within
-L - q/2 and L + q/2: e is L - measured there, and grows by the distance over `landing` outside (`off_by`). Second
-factor. F_s lies between L_bears, what a rest bore, and L_breaks, what broke it loose:
+sigma the noise, tau = `landing_noises` sigma. Where the sensor of the model rounds to q, a reading L says that x was
+within L - q/2 and L + q/2: e is L - measured there, and grows by the distance over tau / sigma outside (`off_by`).
+Second factor. F_s lies between L_bears, what a rest bore, and L_breaks, what broke it loose:
 
-    r_k = max(L_bears - F_s, F_s - L_breaks, 0) / L_0     L_0 = `break_away` k_s sigma, k_s as on the data sheet
+    r_k = max(L_bears - F_s, F_s - L_breaks, 0) / L_0    L_0 = `break_away_noises` k_s sigma, k_s as on the data sheet
 
-The cost is the soft L1 of all, s^2 (sqrt(1 + (r / s)^2) - 1) summed, s = `soft`. It is smooth in every parameter:
-nothing in it asks whether a slip happened.
+The cost is the soft L1 of all, s^2 (sqrt(1 + (r / s)^2) - 1) summed, s = `soft_noises`. It is smooth in every
+parameter: nothing in it asks whether a slip happened.
 """
 
 from collections.abc import Sequence
@@ -30,36 +30,12 @@ import numpy.typing as npt
 from sim.composition import COULOMB, STATIC, Composition
 from sim.karnopp import Vector
 from workbench.data.record import Record
+from workbench.fit.fit_thresholds import FIT
 from workbench.model.search_coordinates import Parameter
 from workbench.model.simulation_regime import Sampling
 from workbench.model.told_run import RECORDS, ToldMove, ToldPath, ToldRun
 
 Rows = npt.NDArray[np.int64]
-
-
-@dataclass(frozen=True, slots=True, kw_only=True)
-class Weights:
-    """How residuals are weighed."""
-
-    block: int = 20
-    """Samples of a block of a rest: at 200 Hz a lag of the sensor shows in blocks of a tenth of a second."""
-    landing: float = 0.2
-    """tau, in sigma: two integrations of one law end a slide that far apart, however long its rest is averaged."""
-    break_away: float = 2.0
-    """Of what the spring makes of sigma: a break-away tells F_s no better than the record tells where the stem is,"""
-    load: float = 1e-3
-    """nor than this share of F_c: the laws of two integrations differ by as much."""
-    soft: float = 5.0
-    """Residuals beyond which one counts by its amount alone: a wild sample is no evidence."""
-    beside: int = 3
-    """Samples before and after a move that count one by one: each speaks against one that is early or late."""
-    gone: float = 12.0
-    """Noises that a stem goes from its rest that has broken loose: by less a packing yields, or a thread creeps."""
-    wild: float = 1e6
-    """Residual of a sample where the model has no answer."""
-
-
-WEIGHTS = Weights()
 
 
 class Groups(NamedTuple):
@@ -103,7 +79,7 @@ class Layout:
 
 
 @lru_cache(maxsize=RECORDS)
-def layout(record: Record, told: tuple[ToldMove, ...], weights: Weights = WEIGHTS) -> Layout:
+def layout(record: Record, told: tuple[ToldMove, ...]) -> Layout:
     """Return the layout of a record, the same for every model: what is not in a move is at rest."""
     state = np.full(len(record), -2, dtype=np.int64)  # -2 not judged, -1 moving, k in the k-th rest
     rests, after = 0, np.zeros(len(told), dtype=np.int64)
@@ -112,8 +88,8 @@ def layout(record: Record, told: tuple[ToldMove, ...], weights: Weights = WEIGHT
         rests += 1
         for k, move in enumerate(told):
             if move.segment == number:
-                landed = last_in_motion(move, weights) + 1
-                state[first_in_motion(move, weights) : landed] = -1
+                landed = last_in_motion(move) + 1
+                state[first_in_motion(move) : landed] = -1
                 state[landed:end] = after[k] = rests
                 rests += 1
     state[~record.valid] = -2
@@ -121,7 +97,7 @@ def layout(record: Record, told: tuple[ToldMove, ...], weights: Weights = WEIGHT
     names, of = np.unique(state[resting], return_inverse=True)
     first_of = np.searchsorted(of, np.arange(names.size))
     within = np.arange(resting.size) - first_of[of]
-    starts = np.flatnonzero(within % weights.block == 0)
+    starts = np.flatnonzero(within % FIT.weights.block_samples == 0)
     count = np.diff(np.append(starts, resting.size))
     at = {int(name): i for i, name in enumerate(names)}
     moving, rest_of = np.flatnonzero(state == -1), of[starts]
@@ -130,7 +106,7 @@ def layout(record: Record, told: tuple[ToldMove, ...], weights: Weights = WEIGHT
         (int(np.searchsorted(moving, first_in_motion(each))), int(np.searchsorted(moving, last_in_motion(each) + 1)))
         for each in told
     )
-    gone = weights.gone * record.scale_m
+    gone = FIT.weights.gone_noises * record.scale_m
     broken = np.array([k for k, each in enumerate(told) if each.breaks_loose(record, gone)], dtype=np.int64)
     of_moving = np.full(moving.size, len(told), dtype=np.int64)
     for k, (first, end) in enumerate(in_motion):
@@ -151,14 +127,14 @@ def layout(record: Record, told: tuple[ToldMove, ...], weights: Weights = WEIGHT
     )
 
 
-def first_in_motion(move: ToldMove, weights: Weights = WEIGHTS) -> int:
+def first_in_motion(move: ToldMove) -> int:
     """Return the first row of a move that counts by itself."""
-    return max(move.before + 1 - weights.beside, move.rested_from + 1)
+    return max(move.before + 1 - FIT.onsets.reach_periods, move.rested_from + 1)
 
 
-def last_in_motion(move: ToldMove, weights: Weights = WEIGHTS) -> int:
+def last_in_motion(move: ToldMove) -> int:
     """Return the last row of a move that counts by itself."""
-    return min(move.after + weights.beside, move.until) - 1
+    return min(move.after + FIT.onsets.reach_periods, move.until) - 1
 
 
 class Likelihood:
@@ -179,14 +155,13 @@ class Likelihood:
         from_pressure: bool = False,
         load_n: float,
         eased: bool = False,
-        weights: Weights = WEIGHTS,
     ) -> None:
-        self.composition, self.record, self.parameters, self.weights = composition, record, tuple(parameters), weights
+        self.composition, self.record, self.parameters = composition, record, tuple(parameters)
         self.by, self.from_pressure, self.load_n = by, from_pressure, load_n
         self.run = ToldRun(composition, record, tuple(told), by=by, from_pressure=from_pressure)
-        self.layout = layout(record, self.run.moves, weights)
+        self.layout = layout(record, self.run.moves)
         self.sigma_m = record.scale_m
-        self.landing_m = self.sigma_m * np.sqrt(1.0 / self.layout.per_rest + weights.landing**2)
+        self.landing_m = self.sigma_m * np.sqrt(1.0 / self.layout.per_rest + FIT.weights.landing_noises**2)
         self.is_eased = eased
         self._last: tuple[bytes, Groups] | None = None
         self._quantum = next((i for i, each in enumerate(_guesses(composition)) if each == "quantum"), None)
@@ -244,12 +219,11 @@ class Likelihood:
     def off_m(self, path: ToldPath, theta: Vector) -> Vector:
         """Return what a path is off by, m, (n,)."""
         quantum_m = 0.0 if self._quantum is None else float(theta[self._quantum])
-        return off_by(path.indicated_m, self.record.position_m, quantum_m, self.weights.landing)
+        return off_by(path.indicated_m, self.record.position_m, quantum_m)
 
     def of_path(self, path: ToldPath, theta: Vector) -> Groups:
         """Return the residuals of a path."""
-        most = self.weights.wild
-        rows = self.layout
+        rows, most = self.layout, FIT.weights.wild_noises
         e = self.off_m(path, theta) / self.sigma_m
         e = np.maximum(np.fmin(e, most), -most)  # of no number and another fmin takes the other
         sums = np.add.reduceat(e[rows.resting], rows.starts) if rows.starts.size else np.empty(0)
@@ -259,7 +233,12 @@ class Likelihood:
 
     def cost(self, r: Vector) -> float:
         """Return the soft-L1 cost of some residuals, (rows,)."""
-        return float(soft(r, self.weights.soft).sum())
+        return float(soft(r).sum())
+
+    def wide_landings(self, groups: Groups) -> Vector:
+        """Return the residuals of landings, wide, and of break-aways: what leads a search that begins far off."""
+        landed = groups.landings * self.landing_m / (FIT.descent.wide_landings * self.sigma_m)
+        return np.concatenate([landed, groups.break_aways])
 
     def break_rows(self, path: ToldPath, theta: Vector) -> Vector:
         """Return the residuals of the second factor."""
@@ -273,20 +252,20 @@ class Likelihood:
         F_s, bears, breaks = static_n[:, np.newaxis], path.bears_n[self.broken], path.breaks_n[self.broken]
         breaks = np.where(breaks > 0.0, breaks, np.inf)  # it slides on where the record rests: nothing breaks loose
         off = np.maximum(bears - F_s, (F_s - breaks) / wider) / self.load_n
-        return np.asarray(np.maximum(np.fmin(off, self.weights.wild), 0.0))
+        return np.asarray(np.maximum(np.fmin(off, FIT.weights.wild_noises), 0.0))
 
 
-def off_by(simulated_m: Vector, measured_m: Vector, quantum_m: float, tolerance: float) -> Vector:
+def off_by(simulated_m: Vector, measured_m: Vector, quantum_m: float) -> Vector:
     """Return e, m, (n,), of what is simulated, before its sensor rounds it: a reading L says x in [L - q/2, L + q/2].
 
-    Outside, e grows with the distance over a tolerance, to what the rounded position is off by at the most.
+    Outside, e grows with the distance over tau / sigma, to what the rounded position is off by at the most.
     """
     if not quantum_m > 0.0:
         return simulated_m - measured_m
     level_m, rounded_m = (quantum_m * np.floor(each / quantum_m + 0.5) for each in (measured_m, simulated_m))
     beyond_m = simulated_m - np.clip(simulated_m, level_m - 0.5 * quantum_m, level_m + 0.5 * quantum_m)
     most_m = np.abs(rounded_m - level_m)
-    return level_m - measured_m + np.clip(beyond_m / tolerance, -most_m, most_m)
+    return level_m - measured_m + np.clip(beyond_m / FIT.weights.landing_noises, -most_m, most_m)
 
 
 def _guesses(composition: Composition) -> list[str]:
@@ -299,20 +278,21 @@ def with_static(like: Likelihood, theta: Vector, path: ToldPath) -> Vector:
     """Return a parameter vector with the static friction that its path's break-aways like best, (parameters,)."""
     ends_n = np.concatenate([path.bears_n[like.broken], path.breaks_n[like.broken]])
     tried_n = np.append(theta[STATIC], np.unique(ends_n[np.isfinite(ends_n) & (ends_n > theta[COULOMB])]))
-    costs = soft(like.rows_of_static(path, tried_n), like.weights.soft).sum(axis=1)
+    costs = soft(like.rows_of_static(path, tried_n)).sum(axis=1)
     there = theta.copy()
     there[STATIC] = tried_n[int(np.argmin(costs))]
     return there
 
 
-def soft(r: Vector, scale: float = WEIGHTS.soft) -> Vector:
+def soft(r: Vector) -> Vector:
     """Return the soft-L1 cost of each residual."""
+    scale = FIT.weights.soft_noises
     return np.asarray(scale**2 * (np.sqrt(1.0 + (r / scale) ** 2) - 1.0))
 
 
-def soft_weight(r: Vector, scale: float = WEIGHTS.soft) -> Vector:
+def soft_weight(r: Vector) -> Vector:
     """Return W of each residual: W r is the slope of its soft-L1 cost."""
-    return np.asarray(1.0 / np.sqrt(1.0 + (r / scale) ** 2))
+    return np.asarray(1.0 / np.sqrt(1.0 + (r / FIT.weights.soft_noises) ** 2))
 
 
 def coupling(of: Rows, by_z: Vector, by_onset: Vector, weight: Vector, moves: int) -> tuple[Vector, Vector]:

@@ -27,69 +27,8 @@ import numpy as np
 from sim.composition import COULOMB, SPRING, STATIC, VISCOUS
 from sim.karnopp import Vector
 from workbench.fit.breaking_off import go_on
+from workbench.fit.fit_thresholds import FIT, Effort
 from workbench.fit.likelihood import Groups, Likelihood, Rows, by_move, coupling, soft, soft_weight
-from workbench.fit.onsets import SEARCH as ONSETS
-from workbench.fit.onsets import SHIFT
-
-
-class Effort(NamedTuple):
-    """How long is searched."""
-
-    simulations: int
-    """At most."""
-    enough: float
-    """Relative fall of the cost in a step that ends the search."""
-
-
-@dataclass(frozen=True, slots=True, kw_only=True)
-class Search:
-    """How far and how finely is searched."""
-
-    step: float = 1e-4
-    """Of a coordinate, for its derivatives: a simulation is smooth to a hundredth of that."""
-    wide_step: float = 3e-3
-    """The same where a search stays on an edge, whose slope over so little is that of one side."""
-    begin: float = 3.0
-    """Weight of landings at the beginning, in their deviations: wide, lest one of them decides the valley."""
-
-
-@dataclass(frozen=True, slots=True, kw_only=True)
-class Damping:
-    """How lambda follows the steps, as usual (Nocedal and Wright, Numerical Optimization, 4.1 and 10.3)."""
-
-    first: float = 1e-3
-    least: float = 1e-4
-    most: float = 100.0
-    """Where no step so short leads lower, none does: what is left is the arithmetic's."""
-    good: float = 0.75
-    """Share of what a step promised, from which on lambda falls."""
-    poor: float = 0.25
-    """The same, below which it grows, and J is taken anew."""
-    down: float = 0.2
-    up: float = 2.0
-    failed: float = 10.0
-    """Factors on lambda: after a good step, a poor one, and one that led higher."""
-    free: float = 0.1
-    """Lambda up to which a small step is small by itself and not by lambda."""
-    longest: float = 0.3
-    """Of a coordinate, a logarithm mostly, in a step without damping: one that hardly matters is not thrown about."""
-    part: float = 0.8
-    """Of the way to a bound that one step takes at most: a coordinate that a first step throws there is lost."""
-
-
-SEARCH, DAMPING = Search(), Damping()
-PRIOR = {SPRING: 0.15, COULOMB: 0.4, VISCOUS: 0.7, STATIC: 0.1}
-"""Standard deviations of logarithms by which a valve may be off its data sheet; of F_s / F_c."""
-TO_BEGIN = Effort(40, 1e-2)
-"""By landings alone: three times as long ends in the same valleys."""
-GLIMPSE = Effort(20, 1e-2)
-"""Derivatives and a dozen steps: of 22 records of one effect that one is among the first three then."""
-COARSE = Effort(60, 1e-2)
-"""To tell a valley from another."""
-WHOLE = Effort(400, 1e-4)
-"""To its end, a tenth of a nat of a thousand residuals: one that takes more is not to be had."""
-NO_SLOPE = 1e-12
-"""Curvature of a cost by an onset that it does not hang on."""
 
 
 class Slopes(NamedTuple):
@@ -117,11 +56,10 @@ class Ground:
     """The move that each residual belongs to, (rows,); the number of moves: none."""
     low: Place
     high: Place
-    soft: float
 
     def cost(self, r: Vector) -> float:
         """Return the soft-L1 cost of residuals."""
-        return float(soft(r, self.soft).sum())
+        return float(soft(r).sum())
 
     def of_moves(self, values: Vector) -> Vector:
         """Return sums over the residuals of each move, (moves,)."""
@@ -131,7 +69,7 @@ class Ground:
         """Return of each residual its move's value, (rows,); 0 of none."""
         return np.asarray(np.append(values, 0.0)[self.of])
 
-    def slopes(self, at: Place, r: Vector, step: float = SEARCH.step) -> Slopes:
+    def slopes(self, at: Place, r: Vector, step: float = FIT.descent.step) -> Slopes:
         """Return the derivatives of residuals r, by forward differences, backward at an upper end."""
         by_z = np.empty((r.size, at.z.size))
         for i in range(at.z.size):
@@ -141,7 +79,7 @@ class Ground:
             by_z[:, i] = (self.rows(Place(there, at.o)) - r) / step
         if not at.o.size:
             return Slopes(by_z, np.zeros(r.size))
-        shifted = (self.rows(Place(at.z, at.o + SHIFT)) - r) / SHIFT
+        shifted = (self.rows(Place(at.z, at.o + FIT.onsets.shift_periods)) - r) / FIT.onsets.shift_periods
         return Slopes(by_z, np.where(self.of < at.o.size, shifted, 0.0))
 
 
@@ -155,14 +93,14 @@ def minimise(ground: Ground, begin: Place, effort: Effort) -> Place:
         return rows(place)
 
     here = Place(*(np.clip(at, low, high) for at, low, high in zip(begin, ground.low, ground.high, strict=True)))
-    ground = Ground(simulated, ground.of, ground.low, ground.high, ground.soft)
+    ground = Ground(simulated, ground.of, ground.low, ground.high)
     r = ground.rows(here)
-    cost, slopes, fresh, damping, idle = ground.cost(r), ground.slopes(here, r), True, DAMPING.first, False
-    while left > 0 and damping <= DAMPING.most:
+    cost, slopes, fresh, damping, idle = ground.cost(r), ground.slopes(here, r), True, FIT.damping.first, False
+    while left > 0 and damping <= FIT.damping.most:
         step, lengths = _step(ground, here, r, slopes, damping)
         linear = r + slopes.by_z @ step.z + slopes.by_onset * ground.to_rows(step.o)
-        promised, free = cost - ground.cost(linear), damping <= DAMPING.free
-        if promised <= 0.5 * enough * cost * (1.0 if free else DAMPING.free):
+        promised, free = cost - ground.cost(linear), damping <= FIT.damping.free
+        if promised <= 0.5 * enough * cost * (1.0 if free else FIT.damping.free):
             if fresh:
                 break
             slopes, fresh = ground.slopes(here, r, _width(damping)), True
@@ -170,23 +108,23 @@ def minimise(ground: Ground, begin: Place, effort: Effort) -> Place:
         there = Place(here.z + step.z, here.o + step.o)
         r_there = ground.rows(there)
         gained = cost - ground.cost(r_there)
-        if gained <= DAMPING.poor * promised and here.o.size:
+        if gained <= FIT.damping.poor * promised and here.o.size:
             there, r_there = _with_onsets_that_help(ground, there, r_there, here.o)
             step = Place(step.z, there.o - here.o)
             linear = r + slopes.by_z @ step.z + slopes.by_onset * ground.to_rows(step.o)
             gained = cost - ground.cost(r_there)
-        kept, small = gained > DAMPING.poor * promised, gained < enough * cost
+        kept, small = gained > FIT.damping.poor * promised, gained < enough * cost
         if gained <= 0.0:
-            damping *= DAMPING.failed
-            if not fresh or damping / DAMPING.failed <= DAMPING.free < damping:
+            damping *= FIT.damping.failed
+            if not fresh or damping / FIT.damping.failed <= FIT.damping.free < damping:
                 slopes, fresh = ground.slopes(here, r, _width(damping)), True
             continue
         slopes = _seen(ground, slopes, r_there - linear, step, lengths)
         here, r, cost = there, r_there, cost - gained
         if fresh and small and (idle or (free and kept)):
             break
-        good = gained > DAMPING.good * promised
-        damping = max(damping * (DAMPING.down if good else 1.0 if kept else DAMPING.up), DAMPING.least)
+        good = gained > FIT.damping.good * promised
+        damping = max(damping * (FIT.damping.down if good else 1.0 if kept else FIT.damping.up), FIT.damping.least)
         idle, fresh = small, small or not kept
         if fresh:
             slopes = ground.slopes(here, r, _width(damping))
@@ -195,7 +133,7 @@ def minimise(ground: Ground, begin: Place, effort: Effort) -> Place:
 
 def _width(damping: float) -> float:
     """Return the step of a coordinate for its derivatives: wide where no step over narrow slopes led lower."""
-    return SEARCH.wide_step if damping > DAMPING.free else SEARCH.step
+    return FIT.descent.wide_step if damping > FIT.damping.free else FIT.descent.step
 
 
 def _with_onsets_that_help(ground: Ground, there: Place, r: Vector, before: Vector) -> tuple[Place, Vector]:
@@ -204,7 +142,7 @@ def _with_onsets_that_help(ground: Ground, there: Place, r: Vector, before: Vect
     Where a command steps an onset has no slope on one side: what it was promised may be the other's.
     """
     left = ground.rows(Place(there.z, before))
-    worse = ground.of_moves(soft(left, ground.soft)) < ground.of_moves(soft(r, ground.soft))
+    worse = ground.of_moves(soft(left)) < ground.of_moves(soft(r))
     mixed = Place(there.z, np.where(worse, before, there.o))
     r_mixed = ground.rows(mixed)
     return (mixed, r_mixed) if ground.cost(r_mixed) < ground.cost(r) else (there, r)
@@ -213,20 +151,20 @@ def _with_onsets_that_help(ground: Ground, there: Place, r: Vector, before: Vect
 def _step(ground: Ground, here: Place, r: Vector, slopes: Slopes, damping: float) -> tuple[Place, Place]:
     """Return the damped step inside the bounds, and the square root of the curvature by each variable."""
     J, j = slopes
-    weight = soft_weight(r, ground.soft)
+    weight = soft_weight(r)
     A, g_z = J.T @ (weight[:, None] * J), J.T @ (weight * r)
     C, D = coupling(ground.of, J, j, weight, here.o.size)
     g_o = ground.of_moves(weight * r * j)
     diagonal = np.diag(A).copy()
-    stays = ((here.o <= ground.low.o) & (g_o > 0.0)) | ((here.o >= ground.high.o) & (g_o < 0.0)) | (D <= NO_SLOPE)
+    stays = ((here.o <= ground.low.o) & (g_o > 0.0)) | ((here.o >= ground.high.o) & (g_o < 0.0)) | (FIT.nothing >= D)
     usual = D.mean() if D.size else 0.0  # an onset that its move hardly hangs on is not thrown about for it
-    damped = np.where(stays, np.inf, D + damping * np.maximum(D, usual) + NO_SLOPE)
-    S = A + np.diag((damping + NO_SLOPE) * diagonal) - (C / damped) @ C.T
+    damped = np.where(stays, np.inf, D + damping * np.maximum(D, usual) + FIT.nothing)
+    S = A + np.diag((damping + FIT.nothing) * diagonal) - (C / damped) @ C.T
     wanted = (C / damped) @ g_o - g_z
     free = ~(((here.z <= ground.low.z) & (g_z > 0.0)) | ((here.z >= ground.high.z) & (g_z < 0.0)) | (diagonal <= 0.0))
-    longest = DAMPING.longest / (1.0 + 10.0 * damping)
-    low = np.maximum(DAMPING.part * (ground.low.z - here.z), -longest)
-    high = np.minimum(DAMPING.part * (ground.high.z - here.z), longest)
+    longest = FIT.damping.longest / (1.0 + 10.0 * damping)
+    low = np.maximum(FIT.damping.part * (ground.low.z - here.z), -longest)
+    high = np.minimum(FIT.damping.part * (ground.high.z - here.z), longest)
     z = np.zeros(here.z.size)
     while free.any():
         z[free] = np.linalg.lstsq(S[np.ix_(free, free)], wanted[free] - S[np.ix_(free, ~free)] @ z[~free])[0]
@@ -236,7 +174,7 @@ def _step(ground: Ground, here: Place, r: Vector, slopes: Slopes, damping: float
             break
         free &= ~out
     o = np.clip(here.o - (g_o + z @ C) / damped, ground.low.o, ground.high.o) - here.o
-    return Place(z, o), Place(np.sqrt(diagonal), np.sqrt(np.maximum(D, NO_SLOPE)))
+    return Place(z, o), Place(np.sqrt(diagonal), np.sqrt(np.maximum(D, FIT.nothing)))
 
 
 def _seen(ground: Ground, slopes: Slopes, miss: Vector, step: Place, lengths: Place) -> Slopes:
@@ -265,26 +203,32 @@ class End:
 def begin_by_landings(like: Likelihood, z: Vector) -> Vector:
     """Return the coordinates to which landings and break-aways lead, (parameters,)."""
     onsets_s = like.run.first_onsets_s()
-    prior = np.array([PRIOR.get(each.index, np.inf) for each in like.parameters])
+    sheet = FIT.sheet
+    deviations = {
+        SPRING: sheet.spring_deviation,
+        COULOMB: sheet.coulomb_deviation,
+        VISCOUS: sheet.viscous_deviation,
+        STATIC: sheet.static_deviation,
+    }
+    prior = np.array([deviations.get(each.index, np.inf) for each in like.parameters])
     low, high = _bounds(like)
     start, none = np.clip(z, low, high), np.empty(0)
 
     def rows(at: Place) -> Vector:
         go_on()
         found = like.at(like.theta(at.z), onsets_s)
-        landed = found.landings * like.landing_m / (SEARCH.begin * like.sigma_m)
-        return np.concatenate([landed, found.break_aways, (at.z - start) / prior])
+        return np.concatenate([like.wide_landings(found), (at.z - start) / prior])
 
     of = np.zeros(like.layout.per_rest.size + like.broken.size + start.size, dtype=np.int64)
-    ground = Ground(rows, of, Place(low, none), Place(high, none), like.weights.soft)
-    return minimise(ground, Place(start, none), TO_BEGIN).z
+    ground = Ground(rows, of, Place(low, none), Place(high, none))
+    return minimise(ground, Place(start, none), FIT.descent.by_landings).z
 
 
 def descend(
     like: Likelihood,
     z: Vector,
     onsets_s: Vector | None = None,
-    effort: Effort = WHOLE,
+    effort: Effort = FIT.descent.whole,
     *,
     held: tuple[Vector, Vector] | None = None,
 ) -> End:
@@ -297,7 +241,7 @@ def descend(
     found = minimise(ground, Place(z, _periods(like, begin_s)), effort)
     onsets_s = _seconds(like, found.o)
     groups = like.at(like.theta(found.z), onsets_s)
-    jacobian = derivatives(like, found.z, onsets_s) if effort == WHOLE else np.empty((0, 0))
+    jacobian = derivatives(like, found.z, onsets_s) if effort == FIT.descent.whole else np.empty((0, 0))
     return End(found.z, onsets_s, like.cost(groups.whole), groups, jacobian, like.is_eased)
 
 
@@ -313,7 +257,7 @@ def derivatives(like: Likelihood, z: Vector, onsets_s: Vector) -> Vector:
 def _ground(like: Likelihood, held: tuple[Vector, Vector] | None = None) -> Ground:
     """Return the ground of a likelihood, its coordinates held as of `descend`."""
     low, high = _bounds(like)
-    earliest_s, latest_s = like.run.bounds_s(ONSETS.reach)
+    earliest_s, latest_s = like.run.bounds_s(FIT.onsets.reach_periods)
 
     def rows(at: Place) -> Vector:
         go_on()
@@ -321,9 +265,7 @@ def _ground(like: Likelihood, held: tuple[Vector, Vector] | None = None) -> Grou
         return whole if held is None else np.concatenate([whole, held[1] @ (at.z - held[0])])
 
     of = like.move_of if held is None else np.append(like.move_of, np.full(low.size, len(like.moves)))
-    return Ground(
-        rows, of, Place(low, _periods(like, earliest_s)), Place(high, _periods(like, latest_s)), like.weights.soft
-    )
+    return Ground(rows, of, Place(low, _periods(like, earliest_s)), Place(high, _periods(like, latest_s)))
 
 
 def _periods(like: Likelihood, onsets_s: Vector) -> Vector:

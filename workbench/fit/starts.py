@@ -11,19 +11,10 @@ import numpy as np
 
 from sim.composition import COULOMB, SPRING, STATIC, VISCOUS
 from sim.karnopp import Vector
+from workbench.fit.fit_thresholds import FIT
 from workbench.fit.guesses import guessed_values
 from workbench.fit.likelihood import Groups, Likelihood, with_static
-from workbench.fit.minimiser import SEARCH
 from workbench.model.search_coordinates import Parameter, strengths
-
-OTHER_FRICTION = (0.5, 2.0)
-"""Of the data sheet's, where its own leads to no end at the noise: what an engineer may be off by."""
-OTHER_DAMPING = 2.0
-"""Factor between two dampings that are not one: a data sheet is not off by more."""
-LESS_DAMPING = (0.7, 0.5, 0.35, 0.25)
-"""The same of damping, where a stem may swing past its balance."""
-SAME_NATS = 1e-3
-"""Within which the record tells no strength from another: the first is taken, a stop that nothing comes to is none."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -36,12 +27,13 @@ class Origin:
 
 def base_starts(like: Likelihood) -> list[Vector]:
     """Return coordinates of the data sheet, then with more and with less friction."""
-    return [_times(like, 1.0), *(_times(like, factor, COULOMB, STATIC) for factor in OTHER_FRICTION)]
+    factors = (1.0, 1.0 / FIT.sheet.factor, FIT.sheet.factor)
+    return [_times(like, factor, COULOMB, STATIC) for factor in factors]
 
 
 def swinging_starts(like: Likelihood) -> list[Vector]:
     """Return coordinates of the data sheet with less damping."""
-    return [_times(like, factor, VISCOUS) for factor in LESS_DAMPING]
+    return [_times(like, factor, VISCOUS) for factor in FIT.sheet.less_damping]
 
 
 def _times(like: Likelihood, factor: float, *rows: int) -> Vector:
@@ -93,7 +85,7 @@ def _likeliest(like: Likelihood, thetas: Iterable[Vector], onsets_s: Vector) -> 
 
 
 def _first_of_least(costs: Sequence[float]) -> int:
-    return int(np.argmax(np.array(costs) <= min(costs) + SAME_NATS))
+    return int(np.argmax(np.array(costs) <= min(costs) + FIT.ends.same_start_nats))
 
 
 def _at_its_static(like: Likelihood, theta: Vector, onsets_s: Vector) -> tuple[Vector, Groups]:
@@ -121,8 +113,8 @@ def starts_by_landings(
         sheet: the data sheet.
         points: values of the parameters in place of those that the effects declare.
     """
-    apart = abs(np.log(max(fitted.theta[VISCOUS], 1e-12) / max(sheet.theta[VISCOUS], 1e-12)))
-    origins = ((fitted,), (sheet,)) if apart > np.log(OTHER_DAMPING) else ((fitted, sheet),)
+    apart = abs(np.log(max(fitted.theta[VISCOUS], FIT.nothing) / max(sheet.theta[VISCOUS], FIT.nothing)))
+    origins = ((fitted,), (sheet,)) if apart > np.log(FIT.sheet.factor) else ((fitted, sheet),)
     return [_best_by_landings(like, added, each, points) for each in origins]
 
 
@@ -133,10 +125,8 @@ def _best_by_landings(
     for origin in origins:
         onsets_s = like.run.first_onsets_s() if origin.onsets_s is None else origin.onsets_s
         for theta in _strewn(like, added, origin, points):
-            found = like.at(theta, onsets_s)
-            landed = found.landings * like.landing_m / (SEARCH.begin * like.sigma_m)
             thetas.append(theta)
-            costs.append(like.cost(np.concatenate([landed, found.break_aways])))
+            costs.append(like.cost(like.wide_landings(like.at(theta, onsets_s))))
     return like.coordinates(thetas[_first_of_least(costs)] if thetas else origins[0].theta)
 
 

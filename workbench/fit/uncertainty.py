@@ -1,12 +1,12 @@
 """How well a recording determines what was fitted, by the curvature of its likelihood.
 
     H = J' W^3 J + 1 / f^2   J the residuals by coordinates z and onsets, W = 1 / sqrt(1 + (r / s)^2): the
-                             soft L1 has the slope W r and the curvature W^3; f = `FARTHEST`, the deviation of what
+                             soft L1 has the slope W r and the curvature W^3; f = `farthest`, the deviation of what
                              no residual hangs on
     C = H^-1, but no less in any coordinate than (n - 1) / n sum_k d_k^2, and of an interval (n - 1) / n sum_k e_k^2 / b
     d_k = (A - A_k)^-1 g_k   by how much the coordinates move without the k-th of n moves and the rest that it ends in;
                              A = sum_k A_k curvature by coordinates, onsets eliminated, g_k = J_k' W_k r_k
-    e_k = d_k + ... + d_(k + b - 1)     the same of b = `TOGETHER` moves in a row
+    e_k = d_k + ... + d_(k + b - 1)     the same of b = `moves_together` moves in a row
 
 H^-1 is right where the residuals are the noise; the jackknife by moves (Tukey) where landings scatter by themselves,
 and every move is but one witness; that by blocks (Kuensch 1989) where moves in a row share what disturbs them. An
@@ -25,7 +25,7 @@ as that onset,
     r_k / sqrt(1 + (dr_k / do_k)^2 / D_k)     D_k the curvature by the k-th onset
 
 Where break-aways scatter, s^2 = 2 cost / (n - 1) > 1, a force that no record holds breaks the stem loose, which it does
-early alone: the upper end goes up by `EARLIEST_DEVIATIONS` of its deviations, sqrt(s^2 - 1) L_0.
+early alone: the upper end goes up by `earliest_deviations` of its deviations, sqrt(s^2 - 1) L_0.
 
 A combination of parameters whose standard deviation exceeds 1, a factor of e, is not determined.
 """
@@ -40,31 +40,11 @@ from scipy.special import stdtrit
 
 from sim.composition import COULOMB, STATIC
 from sim.karnopp import Vector
+from workbench.fit.fit_thresholds import FIT
 from workbench.fit.likelihood import Likelihood, coupling, soft, soft_weight
-from workbench.fit.minimiser import NO_SLOPE, End
-from workbench.fit.onsets import SHIFT
+from workbench.fit.minimiser import End
 from workbench.model.told_run import ToldPath
 
-PROBABILITY = 0.975
-"""Of Student's t below the upper end of an interval of 95 %."""
-NORMAL_QUANTILE = 1.96
-"""Deviations that a normal quantity exceeds with the other 2.5 %."""
-FEWEST_FREE = 2.0
-"""Degrees of freedom of Student's t at least."""
-RISE_95 = 1.92
-TOGETHER = 3
-"""Moves in a row that one disturbance may outlast: slips of a ramp follow each other in some tenths of a second."""
-EARLIEST_DEVIATIONS = 2.0
-"""Deviations by which what breaks a stem loose is above its mean: of six independent values the largest is 2.0 of its
-own above theirs (of two 0.7, of twenty 3.6). A stem that is slowly loaded is broken loose by the largest."""
-NOTHING = 1e-12
-"""Of the largest eigenvalue of the scaled information: one that is none."""
-FARTHEST = 8.0
-"""Deviation of a coordinate, a logarithm mostly, of which a record says nothing."""
-UNDETERMINED = 1.0
-"""Standard deviation of a logarithm from which on the curvature does not determine it."""
-INVOLVED = 0.3
-"""Component of a unit vector from which a parameter is named as part of a combination."""
 TOLD = 0.1
 """Change of a log-parameter by which a combination is told."""
 
@@ -127,19 +107,30 @@ class Curvature:
 def _curvature(like: Likelihood, end: End) -> Curvature:
     count = len(like.parameters)
     r = end.groups.whole
-    weight = soft_weight(r, like.weights.soft)
+    weight = soft_weight(r)
     J = end.jacobian
     lengths = np.linalg.norm(J, axis=0)
-    scale = np.hypot(lengths, 1.0 / FARTHEST)
+    scale = np.hypot(lengths, 1.0 / FIT.intervals.farthest)
     scaled = J / scale
-    H = scaled.T @ (weight[:, None] ** 3 * scaled) + np.diag((FARTHEST * scale) ** -2.0)
+    H = scaled.T @ (weight[:, None] ** 3 * scaled) + np.diag((FIT.intervals.farthest * scale) ** -2.0)
     values, vectors = principal_axes(H)
-    values = np.maximum(values, NOTHING * values[-1])
+    values = np.maximum(values, FIT.nothing * values[-1])
     inverse = (vectors / values) @ vectors.T
-    without, free = _without_each_move(like, scaled, weight, r, count, (FARTHEST * scale[:count]) ** -2.0)
-    own, apart, together = np.diag(inverse)[:count], _variance(without, 1), _variance(without, TOGETHER)
-    std = np.minimum(np.sqrt(np.maximum(own, apart)) / scale[:count], FARTHEST)
-    reach = np.where(apart > own, stdtrit(np.maximum(free, FEWEST_FREE), PROBABILITY), NORMAL_QUANTILE) * std
+    without, free = _without_each_move(like, scaled, weight, r, count, (FIT.intervals.farthest * scale[:count]) ** -2.0)
+    own, apart, together = (
+        np.diag(inverse)[:count],
+        _variance(without, 1),
+        _variance(without, FIT.intervals.moves_together),
+    )
+    std = np.minimum(np.sqrt(np.maximum(own, apart)) / scale[:count], FIT.intervals.farthest)
+    reach = (
+        np.where(
+            apart > own,
+            stdtrit(np.maximum(free, FIT.intervals.fewest_free), FIT.intervals.upper),
+            FIT.intervals.deviations,
+        )
+        * std
+    )
     alone = np.maximum(own, apart)
     shared = np.sqrt(np.maximum(together, alone) / alone)
     reach[lengths[:count] == 0.0] = np.inf
@@ -190,7 +181,7 @@ def _without_each_move(
     curved = weight[:, None] ** 3 * by_z
     A = sums((curved[:, :, None] * by_z[:, None, :]).reshape(len(J), count**2)).reshape(moves + 1, count, count)
     C, D = coupling(like.move_of, by_z, by_onset, weight**3, moves)
-    A[:-1] -= C.T[:, :, None] * C.T[:, None, :] / np.maximum(D, NO_SLOPE)[:, None, None]
+    A[:-1] -= C.T[:, :, None] * C.T[:, None, :] / np.maximum(D, FIT.nothing)[:, None, None]
     g = sums((weight * r)[:, None] * by_z)[:-1]
     without = np.linalg.inv(A.sum(axis=0) + np.diag(prior) - A[:-1])
     share = np.diagonal(without @ A[:-1] @ without, axis1=1, axis2=2)
@@ -211,7 +202,7 @@ class Interval:
 
     def of_truth(self, z: Vector) -> tuple[Vector, Vector]:
         """Return the ends within which the truth lies, about coordinates, (parameters,)."""
-        beyond = (EARLIEST_DEVIATIONS - 1.0) * self.early
+        beyond = (FIT.intervals.earliest_deviations - 1.0) * self.early
         return z - self.shared * (z - self.lower), z + self.shared * (self.upper - z) + beyond
 
 
@@ -225,10 +216,10 @@ def uncertainty(like: Likelihood, end: End) -> Uncertainty:
     lower, upper = own.lower, own.upper
     for other in end.as_likely:
         _, there = _about(like, other)
-        share = np.sqrt(1.0 - (other.cost - end.cost) / RISE_95)
+        share = np.sqrt(1.0 - (other.cost - end.cost) / FIT.intervals.rise_nats)
         lower = np.minimum(lower, other.z - share * (other.z - there.lower))
         upper = np.maximum(upper, other.z + share * (there.upper - other.z))
-    std = np.maximum(about.std, np.minimum((upper - lower) / (2.0 * NORMAL_QUANTILE), FARTHEST))
+    std = np.maximum(about.std, np.minimum((upper - lower) / (2.0 * FIT.intervals.deviations), FIT.intervals.farthest))
     open_ones = _open_combinations(like, about.information[:count, :count])
     root = _root(about.covariance[:count, :count], std)
     farther = replace(own, lower=lower, upper=upper).of_truth(end.z)
@@ -244,8 +235,8 @@ def _about(like: Likelihood, end: End) -> tuple[Curvature, Interval]:
         if each.index == STATIC:
             low, high, early[i] = _static_interval(like, end, i, about)
             high = min(high + early[i], each.bounds[1])
-            std[i] = max(std[i] if std[i] < UNDETERMINED else 0.0, 0.25 * (high - low))
-            by_curvature = NORMAL_QUANTILE * std[i]
+            std[i] = max(std[i] if std[i] < FIT.intervals.undetermined else 0.0, 0.25 * (high - low))
+            by_curvature = FIT.intervals.deviations * std[i]
             lower[i], upper[i], shared[i] = min(low, end.z[i] - by_curvature), max(high, end.z[i] + by_curvature), 1.0
     return replace(about, std=std), Interval(lower=lower, upper=upper, shared=shared, early=early)
 
@@ -256,7 +247,7 @@ def _root(covariance: Vector, std: Vector) -> Vector:
     hangs = covariance / np.outer(np.where(own > 0.0, own, 1.0), np.where(own > 0.0, own, 1.0))
     np.fill_diagonal(hangs, 1.0)
     values, vectors = principal_axes(hangs)
-    return np.asarray((vectors / np.sqrt(np.maximum(values, NOTHING))).T / np.maximum(std, NOTHING))
+    return np.asarray((vectors / np.sqrt(np.maximum(values, FIT.nothing))).T / np.maximum(std, FIT.nothing))
 
 
 def _static_interval(like: Likelihood, end: End, i: int, about: Curvature) -> tuple[float, float, float]:
@@ -265,15 +256,17 @@ def _static_interval(like: Likelihood, end: End, i: int, about: Curvature) -> tu
     And the deviation of what breaks the stem loose early.
     """
     theta = like.theta(end.z)
-    path, later = (like.run.run(theta, end.onsets_s + shift * like.run.period_s) for shift in (0.0, SHIFT))
-    gains = np.nan_to_num((later.breaks_n - path.breaks_n) / SHIFT / like.load_n)
+    path, later = (
+        like.run.run(theta, end.onsets_s + shift * like.run.period_s) for shift in (0.0, FIT.onsets.shift_periods)
+    )
+    gains = np.nan_to_num((later.breaks_n - path.breaks_n) / FIT.onsets.shift_periods / like.load_n)
     by_onset = np.diag(about.information)[end.z.size :]
-    wider = np.hypot(1.0, gains / np.sqrt(np.maximum(by_onset, FARTHEST**-2.0)))[like.broken]
+    wider = np.hypot(1.0, gains / np.sqrt(np.maximum(by_onset, FIT.intervals.farthest**-2.0)))[like.broken]
     low, high, early = _by_break_aways(like, theta, path, i, wider)
     others = np.delete(np.arange(end.z.size), i)
     values, vectors = principal_axes(about.covariance[np.ix_(others, others)])
     bounds, below, above = np.array([each.bounds for each in like.parameters]), 0.0, 0.0
-    for way in (NORMAL_QUANTILE * np.sqrt(np.maximum(values, 0.0)) * vectors).T:
+    for way in (FIT.intervals.deviations * np.sqrt(np.maximum(values, 0.0)) * vectors).T:
         found = []
         for step in (-way, way):
             there = like.theta(np.clip(end.z + np.insert(step, i, 0.0), *bounds.T))
@@ -294,9 +287,9 @@ def _by_break_aways(
     reach = np.concatenate([-np.geomspace(1.0, 1e-4, 200), [0.0], np.geomspace(1e-4, 1.0, 200)])
     at = np.unique(np.clip(z + reach, *bounds))
     static_n = theta[COULOMB] * np.exp(at)
-    costs = soft(like.rows_of_static(path, static_n, wider), like.weights.soft).sum(axis=1)
+    costs = soft(like.rows_of_static(path, static_n, wider)).sum(axis=1)
     scatter = max(1.0, 2.0 * min(costs) / max(like.broken.size - 1, 1))
-    near = np.flatnonzero(costs <= min(costs) + RISE_95 * scatter)
+    near = np.flatnonzero(costs <= min(costs) + FIT.intervals.rise_nats * scatter)
     low, high = float(at[max(near[0] - 1, 0)]), float(at[min(near[-1] + 1, at.size - 1)])  # where it is dearer already
     early = np.sqrt(scatter - 1.0) * like.load_n / static_n[int(np.argmin(costs))]
     return low, high, float(np.log1p(early))
@@ -308,10 +301,10 @@ def _open_combinations(like: Likelihood, H: Vector) -> tuple[Combination, ...]:
     values, vectors = principal_axes(H[np.ix_(rows, rows)])
     found = []
     for value, vector in zip(values, vectors.T, strict=True):
-        if value > UNDETERMINED**-2:
+        if value > FIT.intervals.undetermined**-2:
             continue
         order = np.argsort(-np.abs(vector))
-        involved = [i for i in order if abs(vector[i]) > INVOLVED]
+        involved = [i for i in order if abs(vector[i]) > FIT.intervals.involved]
         names = tuple(like.parameters[rows[i]].name for i in involved)
         found.append(Combination(names, tuple(float(vector[i] / vector[involved[0]]) for i in involved)))
     return tuple(found)

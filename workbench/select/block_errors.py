@@ -25,11 +25,11 @@ from sim.composition import STATIC, Composition
 from sim.karnopp import Vector
 from workbench.data.held_out import HELD_OUT_RECORDING, Part, Split, residual_m
 from workbench.fit.fit_result import Counted, Fit, Terms, terms
-from workbench.fit.fitting import COARSE_ROUNDS, at_the_noise, problem_of
+from workbench.fit.fit_thresholds import FIT
+from workbench.fit.fitting import at_the_noise, problem_of
 from workbench.fit.likelihood import Groups, Likelihood
 from workbench.fit.minimiser import descend
 from workbench.fit.onsets import with_onsets
-from workbench.fit.uncertainty import FARTHEST
 from workbench.model.simulation_regime import NO_LANDING
 from workbench.select.residual_structure import structure
 
@@ -136,7 +136,7 @@ def block_errors(fit: Fit, split: Split) -> BlockErrors:
         structure=max(
             structure(part.record, told.error_m, negligible_m) for part, told in ((train, fitted), (test, held_out))
         ),
-        held_out=terms(held_out.like, _of_counted(held_out.like, held_out.groups, test), held_out.moved),
+        held_out=terms(_of_counted(held_out.like, held_out.groups, test), held_out.moved),
     )
 
 
@@ -182,7 +182,7 @@ def _open(fit: Fit, like: Likelihood, z: Column) -> list[Column]:
     """Return other coordinates, along each that a fit leaves open; along static friction, of which it knows a range."""
     deviation, found = fit.known.deviations, []
     for i, each in enumerate(like.parameters):
-        farthest = min(2.0 * deviation[i], FARTHEST)
+        farthest = min(2.0 * deviation[i], FIT.intervals.farthest)
         if each.index == STATIC:
             ahead = farthest * np.arange(1, MOST_TRIED + 1) / MOST_TRIED
         elif deviation[i] > LEFT_OPEN:
@@ -198,7 +198,7 @@ def _open(fit: Fit, like: Likelihood, z: Column) -> list[Column]:
 
 def _cost(like: Likelihood, z: Column, moved: Column) -> float:
     """Return the cost at coordinates, and of how far these are from a fit's, in deviations."""
-    _, groups = with_onsets(like, like.theta(z), COARSE_ROUNDS)
+    _, groups = with_onsets(like, like.theta(z), FIT.onsets.coarse_rounds)
     return like.cost(np.concatenate([groups.whole, moved]))
 
 

@@ -182,7 +182,7 @@ def _left(answer: Record, rival: Fit) -> float:
     like = of.likelihood(composition, tuple(rival.parameters))
     onsets_s, groups = with_onsets(like, composition.theta)
     jacobian = derivatives(like, like.coordinates(composition.theta), onsets_s)
-    weight = np.sqrt(soft_weight(groups.whole, like.weights.soft))
+    weight = np.sqrt(soft_weight(groups.whole))
     r = weight * groups.whole
     left = r - (weight[:, None] * jacobian) @ np.linalg.lstsq(weight[:, None] * jacobian, r)[0]
     return float(np.sqrt(np.mean(left**2)))

@@ -46,9 +46,8 @@ class Left:
         self.groups = like.at(composition.theta, fit.onsets_s)
         slopes = derivatives(like, like.coordinates(composition.theta), fit.onsets_s)
         ends = np.cumsum([each.size for each in self.groups])
-        soft = like.weights.soft
-        self._all = _Projection(self.groups.whole, slopes, soft)
-        self._landings = _Projection(self.groups.landings, slopes[ends[0] : ends[1], : len(fit.parameters)], soft)
+        self._all = _Projection(self.groups.whole, slopes)
+        self._landings = _Projection(self.groups.landings, slopes[ends[0] : ends[1], : len(fit.parameters)])
 
     def share(self, change: Groups) -> float:
         """Return the score of a change."""
@@ -99,8 +98,8 @@ def preview(
 class _Projection:
     """Residuals (rows,), weighed as the soft-L1 cost does, and what their derivatives (rows, columns) leave of them."""
 
-    def __init__(self, r: Series, slopes: Series, soft: float) -> None:
-        self._weights = np.sqrt(soft_weight(r, soft))
+    def __init__(self, r: Series, slopes: Series) -> None:
+        self._weights = np.sqrt(soft_weight(r))
         self._basis, _ = np.linalg.qr(self._weights[:, None] * slopes)
         self._left = self._without(r)
 
