@@ -247,7 +247,7 @@ def test_what_does_not_exist_is_found(span: str, problem: str) -> None:
         "Cycle.requests",
         "controller.step",
         "time.sleep",
-        "LEAST_BIC",
+        "STROKE_SHARES",
         "positioner get --valve FV",
         "python -m benchmarks",
         "make test",

@@ -33,6 +33,7 @@ from workbench.discriminate.experiment_design import (
 from workbench.discriminate.rival_odds import ASKED, RivalOdds, Weighed, evidence
 from workbench.fit.fit_result import Fit
 from workbench.fit.fitting import fit
+from workbench.select.selection_thresholds import SELECTION
 from workbench.select.separating_experiment import REST_S
 
 LIBRARY = {name: shipped_effect(name, "library") for name in shipped_effects()}
@@ -341,7 +342,7 @@ def test_an_effect_that_begins_to_act_only_then_gives_no_odds(fits: dict[str, Fi
 def test_the_best_is_not_named_if_it_does_not_explain_the_experiments(
     fits: dict[str, Fit], recording: Recording, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    monkeypatch.setattr("workbench.discriminate.rival_odds.RARELY_OFF", 0.5)
+    monkeypatch.setattr("workbench.discriminate.rival_odds.SELECTION", replace(SELECTION, rarely_off=0.5))
     found = discriminate(fits, [recording], answering, BOUNDS, LIBRARY, design=Design(2.0))
     assert (found.outcome, found.named) == ("unexplained", ())
     assert found.odds >= 100.0

@@ -22,9 +22,10 @@ from workbench.fit.fitting import base_fit
 from workbench.model.search_coordinates import Parameter
 from workbench.model.told_run import told_moves
 from workbench.select.block_errors import block_errors, block_logs, indistinguishable, relative_error_reduction
-from workbench.select.effect_acceptance import LEAST_BIC, LEAST_HELD_OUT, Gain, evidence_for, gain
+from workbench.select.effect_acceptance import Gain, evidence_for, gain
 from workbench.select.equivalence import algebraic_class, bare_parameter, classes
-from workbench.select.residual_structure import STRUCTURED, structure
+from workbench.select.residual_structure import structure
+from workbench.select.selection_thresholds import SELECTION
 
 LIBRARY = {name: shipped_effect(name, "test") for name in shipped_effects()}
 NOISE_M = 5e-5
@@ -113,15 +114,15 @@ def test_a_fall_is_never_said_of_an_error_that_rises() -> None:
     )
 
 
-@pytest.mark.parametrize("bic", [-50.0, LEAST_BIC, LEAST_BIC + 0.1, 1e4])
-@pytest.mark.parametrize("held_out", [-50.0, LEAST_HELD_OUT, LEAST_HELD_OUT + 0.1, 1e4])
+@pytest.mark.parametrize("bic", [-50.0, SELECTION.least_evidence, SELECTION.least_evidence + 0.1, 1e4])
+@pytest.mark.parametrize("held_out", [-50.0, SELECTION.least_held_out, SELECTION.least_held_out + 0.1, 1e4])
 def test_what_was_fitted_and_what_was_held_out_must_both_say_that_it_is_there(bic: float, held_out: float) -> None:
     reason = Gain(bic, 0.3, held_out).rejection_reason
-    assert (reason == "") == (bic > LEAST_BIC and held_out > LEAST_HELD_OUT)
-    if bic <= LEAST_BIC:
+    assert (reason == "") == (bic > SELECTION.least_evidence and held_out > SELECTION.least_held_out)
+    if bic <= SELECTION.least_evidence:
         assert f"evidence {bic:.3g}, more than 10 needed" in reason
-        assert reason.startswith("may be chance") == (bic >= -LEAST_BIC)
-    elif held_out <= LEAST_HELD_OUT:
+        assert reason.startswith("may be chance") == (bic >= -SELECTION.least_evidence)
+    elif held_out <= SELECTION.least_held_out:
         assert f"evidence {held_out:.3g} there, more than 6 needed" in reason
 
 
@@ -190,7 +191,7 @@ def test_what_was_held_out_may_have_the_valve_where_its_fit_leaves_it_open_and_n
 
 def test_noise_has_no_structure() -> None:
     record = ready(moving())
-    assert max(structure(record, noise(3000, seed)) for seed in range(10)) < STRUCTURED
+    assert max(structure(record, noise(3000, seed)) for seed in range(10)) < SELECTION.most_structure
 
 
 @pytest.mark.parametrize("cause", ["direction", "position", "pressure", "time"])
@@ -202,21 +203,22 @@ def test_a_residual_that_hangs_on_the_state_is_structured(cause: str) -> None:
         "pressure": (record.command_pa - 4e4) / 2e4,
         "time": record.time_s / 15.0,
     }
-    assert structure(record, noise(3000) + NOISE_M * shapes[cause]) > STRUCTURED
+    assert structure(record, noise(3000) + NOISE_M * shapes[cause]) > SELECTION.most_structure
 
 
 def test_what_never_changes_is_no_state_that_a_residual_could_hang_on() -> None:
     recording = moving()
     still = Recording({**recording.columns, "command_pa": np.full(3000, 4e4)})
-    assert structure(ready(still), noise(3000)) < STRUCTURED
+    assert structure(ready(still), noise(3000)) < SELECTION.most_structure
 
 
 def test_a_missed_slip_is_not_structure_and_does_not_hide_it() -> None:
     record = ready(moving())
     slip_m = np.zeros(3000)
     slip_m[1500:1580] = 8e-3
-    assert structure(record, noise(3000) + slip_m) < STRUCTURED
-    assert structure(record, noise(3000) + NOISE_M * np.sign(np.gradient(record.command_pa)) + slip_m) > STRUCTURED
+    assert structure(record, noise(3000) + slip_m) < SELECTION.most_structure
+    either_way_m = NOISE_M * np.sign(np.gradient(record.command_pa))
+    assert structure(record, noise(3000) + either_way_m + slip_m) > SELECTION.most_structure
 
 
 def test_of_a_long_record_the_regressors_are_held_once() -> None:
@@ -279,5 +281,5 @@ def test_too_little_to_hold_some_out_is_said() -> None:
 def test_what_the_arithmetic_leaves_has_no_structure() -> None:
     record = ready(moving())
     left_m = 1e-4 * (noise(3000) + NOISE_M * np.sign(np.gradient(record.command_pa)))
-    assert structure(record, left_m) > STRUCTURED
-    assert structure(record, left_m, 0.1 * NOISE_M) < STRUCTURED
+    assert structure(record, left_m) > SELECTION.most_structure
+    assert structure(record, left_m, 0.1 * NOISE_M) < SELECTION.most_structure

@@ -5,8 +5,8 @@ from dataclasses import replace
 import pytest
 
 from tests.workbench.hand_made import AT_FLOOR, FLOOR_M, LIBRARY, error_with, fitted, model_of
-from workbench.select.effect_acceptance import LEAST_HELD_OUT
 from workbench.select.effect_candidates import EffectStep, EvaluatedModel, judged_step
+from workbench.select.selection_thresholds import SELECTION
 
 POOR = model_of(cost=20.0 * AT_FLOOR, error_m=20.0 * FLOOR_M)
 """The valve as it is, with much to explain."""
@@ -143,8 +143,8 @@ def test_what_narrowly_falls_short_of_the_rule_stands_beside_what_narrowly_passe
     cost = 0.9 * POOR.fit.cost
     step = judged(
         POOR,
-        dead_time=held_out_by(LEAST_HELD_OUT - 0.1, POOR, "dead_time", cost),
-        sensor_lag=held_out_by(LEAST_HELD_OUT + 0.1, POOR, "sensor_lag", 0.999 * cost),
+        dead_time=held_out_by(SELECTION.least_held_out - 0.1, POOR, "dead_time", cost),
+        sensor_lag=held_out_by(SELECTION.least_held_out + 0.1, POOR, "sensor_lag", 0.999 * cost),
         friction_drift=POOR,
     )
     assert {each.name for each in step.candidates if each.accepted} == {"sensor_lag"}

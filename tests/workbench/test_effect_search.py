@@ -24,7 +24,8 @@ from workbench.fit.minimiser import End
 from workbench.model.simulation_regime import DYNAMIC
 from workbench.select import effect_search
 from workbench.select.effect_candidates import EffectStep, EvaluatedModel, judged_step
-from workbench.select.effect_search import FEWEST_GONE_ON, EffectSearch
+from workbench.select.effect_search import EffectSearch
+from workbench.select.selection_thresholds import SELECTION
 from workbench.select.separating_experiment import Experiment
 from workbench.select.tangent_preview import TangentScore
 
@@ -199,7 +200,7 @@ def test_what_is_far_behind_is_not_searched_to_its_end(searched: Searched) -> No
     floors = {"ip_lag": 1.0, "backlash": 1.5, "stribeck": 9.0, "quadratic_drag": 10.0, "friction_drift": 18.0}
     (step,) = searched(lambda there: min((floors[each] for each in there), default=100.0), *floors)
     found = {each.name: each.model.errors.test_rmse_m / FLOOR_M for each in step.candidates if each.model}
-    to_the_end = sorted(floors, key=lambda name: floors[name])[:FEWEST_GONE_ON]
+    to_the_end = sorted(floors, key=lambda name: floors[name])[: SELECTION.beam]
     assert found == pytest.approx({n: each * (1.0 if n in to_the_end else COARSE) for n, each in floors.items()})
 
 

@@ -1,8 +1,8 @@
 """What a valve file leaves of a recording as it was given, before any parameter is fitted.
 
 holds     what was held out has no evidence for the model that was found, or hardly any, or less than overwhelming and
-          from events whose mean is within `MOST_MOVED` standard errors: whatever a fit would rather have, the recording
-          does not refute the file. Where break-aways scatter, evidence does by as much as is asked
+          from events whose mean is within `SELECTION.most_moved` standard errors: whatever a fit would rather have, the
+          recording does not refute the file. Where break-aways scatter, evidence does by as much as is asked
           (`workbench.select.effect_acceptance`)
 is off    it does worse, and leaves more than `compare` calls adequate: where the refitted valve explains all, no
           effect is missing
@@ -18,8 +18,8 @@ from config.valve_file import ValveFile
 from workbench.compare.comparison import ADEQUATE
 from workbench.data.held_out import Split, residual_m
 from workbench.fit.fit_result import NOTHING, Fit
-from workbench.select.block_errors import MOST_MOVED, BlockErrors, block_errors, relative_error_reduction
-from workbench.select.effect_acceptance import LEAST_HELD_OUT, OVERWHELMING_BIC
+from workbench.select.block_errors import BlockErrors, block_errors, relative_error_reduction
+from workbench.select.selection_thresholds import SELECTION
 
 
 @dataclass(frozen=True, slots=True, repr=False)
@@ -41,8 +41,8 @@ class AsGiven(Brief):
         """Whether the recording does not tell the file from the model that was found, whose errors these are."""
         evidence = 2.0 * best.held_out.nats_above(self.errors.held_out)
         _, standard_errors = relative_error_reduction(self.errors.logs, best.logs)
-        scatters = evidence <= OVERWHELMING_BIC and standard_errors <= MOST_MOVED
-        return evidence <= LEAST_HELD_OUT or scatters
+        scatters = evidence <= SELECTION.overwhelming_evidence and standard_errors <= SELECTION.most_moved
+        return evidence <= SELECTION.least_held_out or scatters
 
     def is_off(self, best: BlockErrors) -> bool:
         """Whether it leaves what `compare` would not call adequate, and the model that was found does better."""

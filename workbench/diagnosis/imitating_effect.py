@@ -1,6 +1,6 @@
 """Whether what was named only stands in for something: a form without a name does better, and acts elsewhere.
 
-Of a library that lacks the effect something else comes near, often to less than smooth friction leaves (`AT_FLOOR`).
+Of a library that lacks the effect something else comes near, often to less than smooth friction leaves, 1.6 floors.
 Where an explained record leaves more than the noise may be off by, in its error or where its slides end, the likeliest
 forms of the grammar (`workbench.discover`) are therefore fitted to the valve without what was named. A form does better
 if it outdoes that (`workbench.select.effect_candidates.outdoes`): by more than 10 of evidence, and by more than two
@@ -23,9 +23,9 @@ from workbench.data.held_out import Split
 from workbench.diagnosis.doubt import Case, Doubt
 from workbench.diagnosis.kept_mass import leaves_something
 from workbench.discover.form_search import FIRST_TURN_FORMS, search_forms
-from workbench.select.block_errors import AT_FLOOR, NOISE_KNOWN_TO
 from workbench.select.effect_candidates import EvaluatedModel, outdoes
 from workbench.select.equivalence import algebraic_class
+from workbench.select.selection_thresholds import SELECTION
 
 
 @dataclass(frozen=True, slots=True, repr=False)
@@ -90,8 +90,8 @@ def imitating_effect(case: Case) -> StandIn | None:
 
 def _lands_elsewhere(best: EvaluatedModel, parts: Split) -> bool:
     """Whether slides of a valve whose floor is the noise end where the model has none, by more than noise explains."""
-    repeats = best.floor_m is not None and best.floor_m <= AT_FLOOR * parts.train.record.scale_m
-    return repeats and best.fit.terms.landings.mean_square > NOISE_KNOWN_TO**2
+    repeats = best.floor_m is not None and best.floor_m <= SELECTION.at_floor * parts.train.record.scale_m
+    return repeats and best.fit.terms.landings.mean_square > SELECTION.noise_known_to**2
 
 
 def _places(name: str, library: Mapping[str, Effect]) -> set[str]:

@@ -13,10 +13,11 @@ from config.drive import Kind
 from workbench.diagnosis.diagnosis_thresholds import DIAGNOSIS
 from workbench.diagnosis.doubt import Case, Doubt
 from workbench.fit.fitting import base_fit, problem_of
-from workbench.select.block_errors import NOISE_KNOWN_TO, BlockErrors
+from workbench.select.block_errors import BlockErrors
 from workbench.select.effect_acceptance import gain
 from workbench.select.effect_candidates import EvaluatedModel
 from workbench.select.effect_search import evaluated
+from workbench.select.selection_thresholds import SELECTION
 
 MASS = "mass_kg"
 
@@ -95,5 +96,5 @@ def leaves_something(best: EvaluatedModel) -> bool:
     """
     if best.floor_m is None:
         return True
-    nothing = best.explained and best.errors.floors_left(best.floor_m) <= NOISE_KNOWN_TO
+    nothing = best.explained and best.errors.floors_left(best.floor_m) <= SELECTION.noise_known_to
     return best.errors.train_rmse_m > best.floor_m and not nothing

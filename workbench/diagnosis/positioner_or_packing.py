@@ -34,8 +34,9 @@ from workbench.fit.fit_result import Fit
 from workbench.fit.fitting import fit
 from workbench.model.search_coordinates import BEHIND_POSITIONER as FREE
 from workbench.select.block_errors import block_errors
-from workbench.select.effect_acceptance import LEAST_BIC, Gain, gain
+from workbench.select.effect_acceptance import Gain, gain
 from workbench.select.effect_candidates import EvaluatedModel
+from workbench.select.selection_thresholds import SELECTION
 
 Cause = Literal["packing", "positioner", "both", "at least packing", "at least positioner", "not told"]
 DEAD_BAND = "dead_band_m"
@@ -170,11 +171,12 @@ def _asked(
     # What was fitted may speak for the other, though what was held out does not: then it is not said to be none.
     share = DIAGNOSIS.other_cause
     if found == "packing" and (
-        band.gain.bic > LEAST_BIC or not _excluded(with_dead_band(share * play_m, 0.6), banded, split)
+        band.gain.bic > SELECTION.least_evidence or not _excluded(with_dead_band(share * play_m, 0.6), banded, split)
     ):
         found = "at least packing"
     if found == "positioner" and (
-        friction.gain.bic > LEAST_BIC or not _excluded(with_friction(share * band_m * n_per_m, 0.6), stem, split)
+        friction.gain.bic > SELECTION.least_evidence
+        or not _excluded(with_friction(share * band_m * n_per_m, 0.6), stem, split)
     ):
         found = "at least positioner"
     return PositionerOrPacking(
@@ -195,7 +197,7 @@ def _asked(
 
 def _excluded(other: Fit, found: Fit, split: Split) -> bool:
     """Whether the recording speaks against another valve, by as many of its samples as are independent."""
-    return _worth(other, found, split).gain.bic > LEAST_BIC
+    return _worth(other, found, split).gain.bic > SELECTION.least_evidence
 
 
 class _Worth(NamedTuple):

@@ -13,10 +13,10 @@ from workbench.diagnosis.error_before_fit import AsGiven
 from workbench.diagnosis.judged_landings import unknown_between_samples
 from workbench.diagnosis.verdict import EXPLAINED, Verdict, by_another_name
 from workbench.fit.fit_result import Fit
-from workbench.select.block_errors import NOISE_KNOWN_TO, BlockErrors
-from workbench.select.effect_acceptance import LEAST_BIC
+from workbench.select.block_errors import BlockErrors
 from workbench.select.effect_candidates import EffectCandidate, EffectStep, EvaluatedModel
 from workbench.select.equivalence import classes, distinguishing_record
+from workbench.select.selection_thresholds import SELECTION
 
 OF_COMMAND = "the floor is the repeatability under the command; driven by the measured pressure, less may be left"
 BREAKS_ELSEWHERE = " The stem breaks loose at other loads than this model has."
@@ -66,7 +66,7 @@ def _said(
         said = _adequate(best.errors, parts, length, given)
         return said + suspicion + _scatter(parts, length)
     if verdict in ("missing", "one_of"):
-        all_known = verdict == "one_of" and _floors_left(best.errors, parts) <= NOISE_KNOWN_TO
+        all_known = verdict == "one_of" and _floors_left(best.errors, parts) <= SELECTION.noise_known_to
         left = "" if all_known else f", and {_left(best.errors, parts, steps[-1].suspected)}"
         rivals = apart if verdict == "one_of" else ""
         return f"Missing: {names}{or_another}; {fell}{left}.{rivals}{by_pressure}{suspicion}"
@@ -85,7 +85,7 @@ def _said(
 
 def _tells(candidate: EffectCandidate) -> bool:
     """Whether the fitted part has evidence for a candidate, in independent samples: it may be what is missing."""
-    return candidate.gain is not None and candidate.gain.bic > LEAST_BIC
+    return candidate.gain is not None and candidate.gain.bic > SELECTION.least_evidence
 
 
 def floor_by_pressure(parts: Split, kind: Kind) -> list[str]:
@@ -128,7 +128,7 @@ def _kept_off(equivalent: EffectCandidate | None, best: EvaluatedModel) -> str:
 def _adequate(errors: BlockErrors, parts: Split, length: Scale, given: AsGiven) -> str:
     """Say that the valve explains the record, whether it had to be refitted for that, and what it leaves of it."""
     after, floors = length.said(errors.test_rmse_m), _floors_left(errors, parts)
-    much = floors > NOISE_KNOWN_TO
+    much = floors > SELECTION.noise_known_to
     left = f" {floors:.2g} times the floor is left, which no effect here explains." if much else ""
     if given.is_off(errors):
         fell = f"from {length.number(given.errors.test_rmse_m)} to {after}"
@@ -143,7 +143,7 @@ def _floors_left(errors: BlockErrors, parts: Split) -> float:
 def _left(errors: BlockErrors, parts: Split, suspected: Sequence[EffectCandidate]) -> str:
     """Say what an explained record leaves."""
     floors = _floors_left(errors, parts)
-    if floors <= NOISE_KNOWN_TO:
+    if floors <= SELECTION.noise_known_to:
         return "nothing is left to explain"
     explains = "is proved to explain" if suspected else "here explains"
     return f"{floors:.2g} times the floor is left, which no other effect {explains}"

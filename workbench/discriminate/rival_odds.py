@@ -29,8 +29,9 @@ from workbench.discriminate.experiment_design import DesignedExperiment, Terms, 
 from workbench.fit.fit_result import Fit
 from workbench.fit.fitting import problem_of, refit
 from workbench.fit.threads import on_threads
-from workbench.select.block_errors import AT_FLOOR, RARELY_OFF, event_errors_m, event_logs
+from workbench.select.block_errors import event_errors_m, event_logs
 from workbench.select.effect_acceptance import evidence_for
+from workbench.select.selection_thresholds import SELECTION
 
 ODDS = 100.0
 """Of the best against all others, that name it."""
@@ -144,8 +145,8 @@ class RivalOdds:
         earlier_m = np.quantile(self._begun.errors_m(self.best), ERROR_QUANTILES)
         played_from = sum(map(len, self._begun._recordings))
         now_m = np.quantile(self.errors_m(self.best, played_from), ERROR_QUANTILES)
-        allowed = np.array([AT_FLOOR, RARELY_OFF]) * np.maximum(self.record.floor_or_scale_m, earlier_m)
-        return bool(np.all(now_m <= allowed))
+        floors = np.array([SELECTION.at_floor, SELECTION.rarely_off])
+        return bool(np.all(now_m <= floors * np.maximum(self.record.floor_or_scale_m, earlier_m)))
 
     def errors_m(self, name: str, first: int = 0) -> Vector:
         """Return the rms errors of a rival's events from a row on, m, (events,)."""

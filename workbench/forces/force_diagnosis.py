@@ -25,8 +25,9 @@ from workbench.diagnosis.verdict_sentence import rivals_sentence, verdict_line
 from workbench.forces.force_balance import Balance, ForceFit, ForceModel, floor_of
 from workbench.select.block_errors import indistinguishable, relative_error_reduction
 from workbench.select.candidate_table import NEWTONS, Tried, candidate_columns, candidate_table, draw_race
-from workbench.select.effect_acceptance import LEAST_BIC, Gain, no_better
-from workbench.select.forward_selection import MOST_ADDED, Candidate, ForwardSelection, ForwardStep, without_missing
+from workbench.select.effect_acceptance import Gain, no_better
+from workbench.select.forward_selection import Candidate, ForwardSelection, ForwardStep, without_missing
+from workbench.select.selection_thresholds import SELECTION
 
 if TYPE_CHECKING:
     from matplotlib.figure import Figure
@@ -129,7 +130,7 @@ def _search(balance: Balance) -> ForceDiagnosis:
         if steps:
             steps[-1] = without_missing(steps[-1], step, library)
         explained = floor_n is not None and fit.median_error_n <= BALANCE_FLOORS * floor_n
-        if len(steps) == MOST_ADDED or (steps and explained):
+        if len(steps) == SELECTION.most_added or (steps and explained):
             break
         steps.append(step)
         if step.added is None:
@@ -164,7 +165,7 @@ def _step(number: int, before: ForceFit, fits: Mapping[str, ForceFit], library: 
 
 def _after_first(candidate: ForceCandidate, first: ForceCandidate | None) -> ForceCandidate:
     """Reject what does no better than the effect that it comes after."""
-    if first is None or candidate.rejection_reason or candidate.gain.bic > first.gain.bic + LEAST_BIC:
+    if first is None or candidate.rejection_reason or candidate.gain.bic > first.gain.bic + SELECTION.least_evidence:
         return candidate
     return replace(candidate, rejection_reason=no_better(first.name))
 

@@ -22,9 +22,9 @@ from workbench.report.effects_table import RankedStep, headline, not_told_apart,
 from workbench.report.overlay import HELD_OUT, Mask, Shade, Simulated, overlay
 from workbench.report.plot_series import draw_series, round_values
 from workbench.report.signature_loop import signature
-from workbench.select.effect_acceptance import LEAST_BIC, LEAST_HELD_OUT
 from workbench.select.effect_candidates import EffectCandidate, EvaluatedModel
 from workbench.select.equivalence import undetectable
+from workbench.select.selection_thresholds import SELECTION
 from workbench.select.separating_experiment import Experiment
 
 DIAGNOSIS_WORDS = {
@@ -33,8 +33,8 @@ DIAGNOSIS_WORDS = {
     "Fitted, held out": "The model's parameters are fitted to one part of the data. The other part is held out: "
     "the model has not seen it, so an error that falls there shows more than a good fit.",
     "Evidence": "How much better an effect explains the fitted part than the model without it, less a price for "
-    f"each parameter it brings (gain of the Bayesian information criterion). Above {LEAST_BIC:g} it counts. Held out, "
-    f"where nothing was fitted, no price is taken: above {LEAST_HELD_OUT:g} it counts.",
+    f"each parameter it brings (gain of the Bayesian information criterion). Above {SELECTION.least_evidence:g} it "
+    f"counts. Held out, where nothing was fitted, no price is taken: above {SELECTION.least_held_out:g} it counts.",
     "95 % interval": "The parameter lies in it with a probability of 95 %.",
     "Rival": "An effect that explains the recording as well as the one that was added.",
     "Told simulation": "The simulation is told when the stem moves, as the recording shows it. It computes where the "

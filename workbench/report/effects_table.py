@@ -8,9 +8,9 @@ from workbench.report import effect_ranking
 from workbench.report.display_units import Quantity
 from workbench.report.effect_ranking import RankedEffect
 from workbench.report.report_html import Html, Row, keep_lines, plot, section, subheading, table, text
-from workbench.select.effect_acceptance import LEAST_BIC, LEAST_HELD_OUT
 from workbench.select.equivalence import classes, distinguishing_record
 from workbench.select.forward_selection import Candidate, CandidateT, FittedT, ForwardStep
+from workbench.select.selection_thresholds import SELECTION
 
 VERDICTS = {
     "adequate": ("good", "Nothing is missing that this recording could show."),
@@ -61,8 +61,8 @@ def show_tried(steps: Sequence[RankedStep], floor: float | None, of: Quantity) -
     shown = [
         text(
             "Each effect was added in turn, and the whole model refitted with it. "
-            f"An effect is accepted if its evidence exceeds {LEAST_BIC:g} on the fitted part and {LEAST_HELD_OUT:g} on "
-            "the held-out part, and its parameters are physically possible."
+            f"An effect is accepted if its evidence exceeds {SELECTION.least_evidence:g} on the fitted part and "
+            f"{SELECTION.least_held_out:g} on the held-out part, and its parameters are physically possible."
         )
     ]
     dashed = "dashed the floor, " if floor is not None else ""

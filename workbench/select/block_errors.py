@@ -23,6 +23,7 @@ from config.recording import Column
 from config.results.result import Brief
 from sim.composition import STATIC, Composition
 from sim.karnopp import Vector
+from workbench.compare.measures import BLOCK_S
 from workbench.data.held_out import HELD_OUT_RECORDING, Part, Split, residual_m
 from workbench.fit.fit_result import Counted, Fit, Terms, terms
 from workbench.fit.fit_thresholds import FIT
@@ -32,34 +33,7 @@ from workbench.fit.minimiser import descend
 from workbench.fit.onsets import with_onsets
 from workbench.model.simulation_regime import NO_LANDING
 from workbench.select.residual_structure import structure
-
-AT_FLOOR, RARELY_OFF = 1.6, 1.75
-"""A model reaches the floor if its typical event and its plain error, fitted and held out, are within these of it.
-
-1.6: friction that is smooth where the model's is not (LuGre's) leaves 1.5 times the noise.
-"""
-NOISE_KNOWN_TO = 1.2
-"""A factor: what leaves no more than so many floors leaves nothing that can be told from them."""
-NOTHING_LEFT = 1.1
-"""The same, where no other effect need be sought: one that adds half the floor to it, in squares, leaves 1.12."""
-MOST_LEFT = 0.1
-"""Of the position's standard deviation: a model that leaves more explains little, however badly the valve repeats."""
-MOST_LOG_RATIO = float(np.log(2.0))
-"""What one event counts at most."""
-LEAST_STANDARD_ERROR = 0.01
-"""Of a mean logarithm: no better known, however equal the events."""
-NEGLIGIBLE = 0.1
-"""Of the floor: what an error below it is does not matter."""
-MOST_MOVED = 4.0
-"""Deviations of a coordinate that a fit leaves open: farther is one in 16 000, and contradicts it."""
-LEFT_OPEN = 0.2
-"""Deviation of a coordinate, of a logarithm mostly, from which on a step along the slope may not lead far enough."""
-MOST_TRIED = 10
-"""Places that are tried of it on either side, from so far on to two deviations."""
-SAME_STANDARD_ERRORS, SAME_REDUCTION = 2.0, 0.02
-"""Within one of these two models are indistinguishable."""
-BLOCK_S, BLOCK_SAMPLES = 1.0, 10
-"""A block of what is compared in time, a measured pressure: so long, and of as many samples at least."""
+from workbench.select.selection_thresholds import SELECTION
 
 
 @dataclass(frozen=True, slots=True, repr=False)
@@ -86,9 +60,8 @@ class BlockErrors(Brief):
         """
         if floor_m is None:
             return False
-        return (
-            max(self.train_block_m, self.test_block_m) <= AT_FLOOR * floor_m and self.rms_floors(floor_m) <= RARELY_OFF
-        )
+        typical = max(self.train_block_m, self.test_block_m) <= SELECTION.at_floor * floor_m
+        return typical and self.rms_floors(floor_m) <= SELECTION.rarely_off
 
     def rms_floors(self, floor_m: float) -> float:
         """Return the rms, fitted or held out, whichever is more, in floors."""
@@ -100,11 +73,11 @@ class BlockErrors(Brief):
 
     def leaves_nothing(self, floor_m: float | None) -> bool:
         """Whether what is left of a record that is explained is the floor, so that another effect has no room in it."""
-        return floor_m is not None and self.floors_left(floor_m) <= NOTHING_LEFT
+        return floor_m is not None and self.floors_left(floor_m) <= SELECTION.nothing_left
 
     def follows(self, motion_std_m: float) -> bool:
         """Whether a typical event's error is small against the motion, given by its standard deviation, m."""
-        return max(self.train_block_m, self.test_block_m) <= MOST_LEFT * motion_std_m
+        return max(self.train_block_m, self.test_block_m) <= SELECTION.most_left * motion_std_m
 
 
 def errors_json(errors: BlockErrors) -> dict[str, float]:
@@ -126,7 +99,7 @@ def block_errors(fit: Fit, split: Split) -> BlockErrors:
     fitted, held_out = _on_fitted(fit, train), _on_held_out(fit, test)
     if not np.isfinite(held_out.error_m).any():
         raise InputError(HELD_OUT_RECORDING, NO_LANDING)
-    negligible_m = NEGLIGIBLE * split.scale_m
+    negligible_m = SELECTION.negligible_error * split.scale_m
     return BlockErrors(
         train_rmse_m=_rms(fitted.error_m),
         test_rmse_m=_rms(held_out.error_m),
@@ -173,7 +146,7 @@ def _on_held_out(fit: Fit, part: Part) -> _Told:
         begin = z
     end = descend(like, begin, onsets_s, held=(z, root))
     moved = root @ (end.z - z)
-    if np.abs(moved).max() > MOST_MOVED:
+    if np.abs(moved).max() > SELECTION.most_moved:
         return _at(like, part, theta, onsets_s, np.zeros(z.size))
     return _at(like, part, like.theta(end.z), end.onsets_s, moved)
 
@@ -182,11 +155,11 @@ def _open(fit: Fit, like: Likelihood, z: Column) -> list[Column]:
     """Return other coordinates, along each that a fit leaves open; along static friction, of which it knows a range."""
     deviation, found = fit.known.deviations, []
     for i, each in enumerate(like.parameters):
-        farthest = min(2.0 * deviation[i], FIT.intervals.farthest)
+        farthest = min(SELECTION.same_standard_errors * deviation[i], FIT.intervals.farthest)
         if each.index == STATIC:
-            ahead = farthest * np.arange(1, MOST_TRIED + 1) / MOST_TRIED
-        elif deviation[i] > LEFT_OPEN:
-            ahead = np.geomspace(LEFT_OPEN, farthest, MOST_TRIED)
+            ahead = farthest * np.arange(1, SELECTION.places_tried + 1) / SELECTION.places_tried
+        elif deviation[i] > SELECTION.left_open:
+            ahead = np.geomspace(SELECTION.left_open, farthest, SELECTION.places_tried)
         else:
             continue
         for by in (*-ahead[::-1], *ahead):
@@ -277,7 +250,7 @@ def _rms(error_m: Column) -> float:
 
 def block_s(part: Part) -> float:
     """Return the length of a block of time of a part, s."""
-    return max(BLOCK_S, BLOCK_SAMPLES * part.record.period_s)
+    return max(BLOCK_S, SELECTION.fewest_block_samples * part.record.period_s)
 
 
 def block_logs(time_s: Column, error: Column, negligible: float, block_s: float = BLOCK_S) -> Column:
@@ -297,13 +270,13 @@ def block_logs(time_s: Column, error: Column, negligible: float, block_s: float 
 
 def relative_error_reduction(before: Column, after: Column) -> tuple[float, float]:
     """Return by what part the error of events falls, and that in its standard errors; l_k of the same, (events,)."""
-    d = np.clip(before - after, -MOST_LOG_RATIO, MOST_LOG_RATIO)
+    d = np.clip(before - after, -SELECTION.most_log_ratio, SELECTION.most_log_ratio)
     mean = float(np.mean(d))
     error = float(np.std(d)) / d.size**0.5
-    return 1.0 - float(np.exp(-mean)), mean / max(error, LEAST_STANDARD_ERROR)
+    return 1.0 - float(np.exp(-mean)), mean / max(error, SELECTION.least_standard_error)
 
 
 def indistinguishable(best: Column, other: Column) -> bool:
     """Whether the errors of events l_k, (events,), do not tell two apart: within 2 standard errors or 2 %."""
     reduction, standard_errors = relative_error_reduction(other, best)
-    return reduction < SAME_REDUCTION or standard_errors < SAME_STANDARD_ERRORS
+    return reduction < SELECTION.same_reduction or standard_errors < SELECTION.same_standard_errors

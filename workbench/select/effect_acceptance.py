@@ -23,14 +23,7 @@ from math import log
 
 from workbench.fit.fit_result import Fit, Terms
 from workbench.select.block_errors import BlockErrors
-
-LEAST_BIC = 10.0
-"""Odds of 150 to 1: of twenty effects of which none is there, one has so much in one record of ten."""
-LEAST_HELD_OUT = 6.0
-"""Odds of 20 to 1, from samples that no parameter was fitted to."""
-OVERWHELMING_BIC = 10.0 * LEAST_BIC
-"""Needed, too, where a valve repeats itself no better than the model before is off: what scatters so is not independent
-in all that is counted so."""
+from workbench.select.selection_thresholds import SELECTION
 
 
 @dataclass(frozen=True, slots=True)
@@ -42,13 +35,13 @@ class Gain:
     held_out: float
     """Relative reduction of the held-out rms error."""
     held_out_evidence: float
-    least: float = LEAST_BIC
+    least: float = SELECTION.least_evidence
     """Evidence that is needed."""
 
     @property
     def overwhelming(self) -> bool:
         """Whether the fitted part leaves no doubt, and what was held out does not speak against it."""
-        return self.bic > OVERWHELMING_BIC and self.held_out_evidence >= 0.0
+        return self.bic > SELECTION.overwhelming_evidence and self.held_out_evidence >= 0.0
 
     @property
     def rejection_reason(self) -> str:
@@ -57,21 +50,25 @@ class Gain:
             return f"the fitted part speaks against it: evidence {self.bic:.3g}, more than {self.least:g} needed"
         if self.bic <= self.least:
             return f"may be chance: evidence {self.bic:.3g}, more than {self.least:g} needed"
-        if self.held_out_evidence <= LEAST_HELD_OUT:
+        if self.held_out_evidence <= SELECTION.least_held_out:
             return (
                 f"the held-out part does not show it: evidence {self.held_out_evidence:.3g} there, "
-                f"more than {LEAST_HELD_OUT:g} needed"
+                f"more than {SELECTION.least_held_out:g} needed"
             )
         return ""
 
 
 def no_better(first: str) -> str:
-    """Say why an effect is refused that comes after another and has not `LEAST_BIC` more evidence."""
+    """Say why an effect is refused that comes after another and has not the least evidence more."""
     return f"explains no better than {first}, which is tried before it"
 
 
 def gain(
-    base: Fit, candidate: Fit, base_errors: BlockErrors, candidate_errors: BlockErrors, least: float = LEAST_BIC
+    base: Fit,
+    candidate: Fit,
+    base_errors: BlockErrors,
+    candidate_errors: BlockErrors,
+    least: float = SELECTION.least_evidence,
 ) -> Gain:
     """Compare a candidate with its base; so much evidence is needed at least."""
     return Gain(

@@ -12,20 +12,13 @@ from config.valve_file import ValveParameters
 from sim.effect import Effect, Parameter
 from workbench.fit.fit_result import Fit
 from workbench.fit.parameter_estimate import parameters_json
-from workbench.select.block_errors import AT_FLOOR, BlockErrors, errors_json
+from workbench.select.block_errors import BlockErrors, errors_json
 from workbench.select.candidate_table import Tried
-from workbench.select.effect_acceptance import LEAST_BIC, OVERWHELMING_BIC, Gain, gain, no_better
+from workbench.select.effect_acceptance import Gain, gain, no_better
 from workbench.select.equivalence import algebraic_class, bare_parameter, classes
 from workbench.select.forward_selection import Candidate, ForwardStep
 from workbench.select.pressure_errors import PressureErrors
-from workbench.select.residual_structure import STRUCTURED
-
-AT_END = 0.2
-"""Of the weakest start: nearer to the end of its range a parameter is at it."""
-SAME_COST = 1.01
-"""Factor on the cost within which two members of a class came out as the one they are."""
-MOST_BREAK_AWAY_SQUARES = 4.0
-"""Mean square of what break-aways are off by, in deviations: valves that are right leave 1.0."""
+from workbench.select.selection_thresholds import SELECTION
 
 
 @dataclass(frozen=True, slots=True, repr=False)
@@ -49,7 +42,7 @@ class EvaluatedModel(Brief):
     @property
     def scatters(self) -> bool:
         """Whether the valve repeats itself no better than this is off, and worse than the noise."""
-        return self.noise_m is not None and self.at_floor and self.errors.rms_floors(self.noise_m) > AT_FLOOR
+        return self.noise_m is not None and self.at_floor and self.errors.rms_floors(self.noise_m) > SELECTION.at_floor
 
     @property
     def structured(self) -> bool:
@@ -58,7 +51,7 @@ class EvaluatedModel(Brief):
         Within what a valve scatters it may.
         """
         of_floor = 1.0 if self.floor_m is None else min(1.0, self.errors.rms_floors(self.floor_m))
-        return not self.scatters and self.errors.structure * of_floor**2 > STRUCTURED
+        return not self.scatters and self.errors.structure * of_floor**2 > SELECTION.most_structure
 
     @property
     def breaks_elsewhere(self) -> bool:
@@ -66,7 +59,7 @@ class EvaluatedModel(Brief):
 
         Within what a valve scatters it may.
         """
-        return not self.scatters and self.fit.terms.break_aways.mean_square > MOST_BREAK_AWAY_SQUARES
+        return not self.scatters and self.fit.terms.break_aways.mean_square > SELECTION.most_break_away_squares
 
     @property
     def explained(self) -> bool:
@@ -170,7 +163,7 @@ def score_above(one: EvaluatedModel, other: EvaluatedModel) -> float:
 
 def indistinguishable(best: EvaluatedModel, other: EvaluatedModel) -> bool:
     """Whether two models are so nearly as likely that both may be what is missing."""
-    return score_above(best, other) < LEAST_BIC
+    return score_above(best, other) < SELECTION.least_evidence
 
 
 def _candidate(
@@ -178,7 +171,7 @@ def _candidate(
 ) -> EffectCandidate:
     if isinstance(model, str):
         return EffectCandidate(number, name, model, None, None, False)
-    least = OVERWHELMING_BIC if before.scatters else LEAST_BIC
+    least = SELECTION.overwhelming_evidence if before.scatters else SELECTION.least_evidence
     found = gain(before.fit, model.fit, before.errors, model.errors, least)
     beyond = _beyond(name, model.fit, library[name])
     same = bare_parameter(name, library)
@@ -190,7 +183,7 @@ def _candidate(
 
 def _after_first(candidate: EffectCandidate, first: EffectCandidate | None) -> EffectCandidate:
     """Reject what does no better than the effect that it comes after."""
-    if first is None or candidate.evidence > first.evidence + LEAST_BIC:
+    if first is None or candidate.evidence > first.evidence + SELECTION.least_evidence:
         return candidate
     return replace(candidate, rejection_reason=candidate.rejection_reason or no_better(first.name), outdone=True)
 
@@ -205,15 +198,17 @@ def _best(
         return ordered, None
     best = next(iter(accepted.values()))
     assert best.model
-    as_evident = [each for each in accepted.values() if each.model and each.evidence > best.evidence - LEAST_BIC]
+    least = best.evidence - SELECTION.least_evidence
     # What was fitted does not tell these; what was held out does, if one of them explains that.
-    best = next((each for each in as_evident if each.model and each.model.explained), best)
+    best = next(
+        (each for each in accepted.values() if each.evidence > least and each.model and each.model.explained), best
+    )
     first = accepted[min(algebraic_class(best.name, library) & accepted.keys())]
     assert best.model
     assert first.model
     # A class is not ranked inside, but a search that failed is no reason to go on from there.
-    as_good = first.model.fit.cost < SAME_COST * best.model.fit.cost and first.model.explained == best.model.explained
-    return ordered, first if as_good else best
+    as_near = first.model.fit.cost < SELECTION.same_cost * best.model.fit.cost
+    return ordered, first if as_near and first.model.explained == best.model.explained else best
 
 
 def _bare_equivalent(candidates: Sequence[EffectCandidate], library: Mapping[str, Effect]) -> EffectCandidate | None:
@@ -224,7 +219,7 @@ def _bare_equivalent(candidates: Sequence[EffectCandidate], library: Mapping[str
 
 def _better_than(equivalent: EffectCandidate, candidates: Sequence[EffectCandidate]) -> tuple[EffectCandidate, ...]:
     """Reject what does no better than the bare valve by another name: no imitation of it is to be named."""
-    least = equivalent.evidence + LEAST_BIC
+    least = equivalent.evidence + SELECTION.least_evidence
     reason = f"explains no better than {equivalent.name}, the bare valve with other parameters"
     return tuple(
         replace(each, rejection_reason=reason) if each.accepted and each.evidence <= least else each
@@ -279,7 +274,7 @@ def pressure_speaks_against(model: EvaluatedModel, others: Sequence[EvaluatedMod
 
 def may_be_there(candidate: EffectCandidate, library: Mapping[str, Effect]) -> bool:
     """Whether an effect is physical, has evidence, and is not the bare valve by another name."""
-    evident = candidate.physical and not candidate.outdone and candidate.evidence > LEAST_BIC
+    evident = candidate.physical and not candidate.outdone and candidate.evidence > SELECTION.least_evidence
     return evident and bare_parameter(candidate.name, library) is None
 
 
@@ -312,6 +307,6 @@ def _at_end(value: float, declared: Parameter, valve: ValveParameters) -> bool:
     """Whether a value lies nearer to an end of the range than a fifth of any start that is not the end itself."""
     starts = declared.starts_for(valve)
     return any(
-        abs(value - end) < AT_END * min((abs(start - end) for start in starts if start != end), default=0.0)
+        abs(value - end) < SELECTION.at_end * min((abs(start - end) for start in starts if start != end), default=0.0)
         for end in (declared.least, declared.most)
     )

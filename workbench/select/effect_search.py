@@ -2,9 +2,9 @@
 
     score(model) = evidence(model, base) + 2 (log-likelihood of what is held out, less the base's)
 
-A round extends each of the best `BEAM` models, the bare one by every effect, others by the `SCREENED` whose tangents
-promise most, and ranks all that it comes to by their scores. Rounds go on while some extension is evident, and more
-than the noise is left, up to three effects. Of an answer of three the later two are tried without the first. The best
+A round extends each of the best models, the bare one by every effect, others by those whose tangents promise most, and
+ranks all that it comes to by their scores. Rounds go on while some extension is evident, and more than the noise is
+left, up to three effects. Of an answer of three the later two are tried without the first. The best
 model of all is, of those as likely as the likeliest, that of the fewest effects. Its steps are read off the beam: each
 adds the effect that the beam added there, beside all that were tried there.
 
@@ -28,7 +28,7 @@ from workbench.fit.fit_result import Fit
 from workbench.fit.fitting import Trial, advance, base_fit, finish, glimpse, leave_off, settled
 from workbench.fit.threads import on_threads
 from workbench.select.block_errors import block_errors
-from workbench.select.effect_acceptance import LEAST_BIC, evidence_for, promise
+from workbench.select.effect_acceptance import evidence_for, promise
 from workbench.select.effect_candidates import (
     EffectCandidate,
     EffectStep,
@@ -42,22 +42,12 @@ from workbench.select.effect_candidates import (
     with_added,
 )
 from workbench.select.equivalence import algebraic_class, classes
-from workbench.select.forward_selection import MOST_ADDED, without_missing
+from workbench.select.forward_selection import without_missing
 from workbench.select.pressure_errors import pressure_errors
 from workbench.select.pressure_scatter import with_pressure_scatter
+from workbench.select.selection_thresholds import SELECTION
 from workbench.select.separating_experiment import Experiment, experiment
 from workbench.select.tangent_preview import Changes, Left, changes, rank
-
-BEAM = 3
-"""Models that a round goes on from: of two effects that are missing, the second's best imitation is mostly second."""
-
-SCREENED = 8
-"""Effects tried beside a model that has one already: the first by their tangents (`tangent_preview`)."""
-GONE_ON = 10.0
-"""Factor on the least cost of the effects tried beside a model, up to which another is searched to its end, if it has
-any evidence: what is left of a coarse search lowers its cost by a tenth, seldom by half, rarely by more."""
-FEWEST_GONE_ON = 3
-"""Effects that are searched to their ends whatever they cost."""
 
 T = TypeVar("T")
 S = TypeVar("S")
@@ -133,14 +123,14 @@ class EffectSearch:
     def steps(self, base: EvaluatedModel) -> tuple[EffectStep, ...]:
         """Search from a fitted valve."""
         beam = [_Round(base, ())]
-        for number in range(1, MOST_ADDED + 1):
+        for number in range(1, SELECTION.most_added + 1):
             for each in beam:
                 self._try_all(number, each)
             found = [model for each in beam for model, _ in self._extended(each)]
             if not found:
                 break
-            found.sort(key=lambda each: -self._score(base, each.before))
-            beam = _one_of_each(found)[:BEAM]
+            found.sort(key=lambda each: -score_above(each.before, base))
+            beam = _one_of_each(found)[: SELECTION.beam]
             if self._leaves_nothing(beam[0].before):
                 break
             if beam[0].before.explained:
@@ -156,7 +146,7 @@ class EffectSearch:
         What imitates two effects is ahead of either, and is left in when both are found (floating search; Pudil 1994).
         """
         names = self._best_path(base)
-        if len(names) < MOST_ADDED:
+        if len(names) < SELECTION.most_added:
             return None
         _, second, third = names
         alone = self._rounds[()].models.get(second, "comes after another")
@@ -192,7 +182,7 @@ class EffectSearch:
         shown = {name: self._changes[name] for name in names if name in self._changes}
         best_one_has = [name for name in names if name not in shown]
         by_tangents = [each.name for each in rank(left, shown)]
-        return [*best_one_has, *by_tangents][:SCREENED]
+        return [*best_one_has, *by_tangents][: SELECTION.screened]
 
     def _try_all(self, number: int, here: _Round) -> None:
         """Fit every effect beside a model."""
@@ -201,7 +191,11 @@ class EffectSearch:
         beside = self._beside(here)
         first = [name for name, each in beside.items() if each.after not in self._library]
         self._fit_beside(number, here, first if number == 1 else self._screen(here, first))
-        evident = {name for name, each in here.models.items() if self._evidence(here.before, each) > LEAST_BIC}
+        evident = {
+            name
+            for name, each in here.models.items()
+            if not isinstance(each, str) and evidence_for(each.fit, here.before.fit) > SELECTION.least_evidence
+        }
         after = [
             name
             for name, each in beside.items()
@@ -222,7 +216,7 @@ class EffectSearch:
             trials[name] = trial
             self._progress(f"step {number}: trying {len(ordered)} effects", len(trials) / len(ordered))
         found = {name: each for name, each in trials.items() if not isinstance(each, str)}
-        better = sorted(found, key=lambda name: found[name].cost)[: max(FEWEST_GONE_ON, (len(found) + 1) // 2)]
+        better = sorted(found, key=lambda name: found[name].cost)[: max(SELECTION.beam, (len(found) + 1) // 2)]
         advanced = dict(self._each(advance, {name: found[name] for name in better}))
         found |= {name: each for name, each in advanced.items() if not isinstance(each, str)}
         promised = {
@@ -230,8 +224,9 @@ class EffectSearch:
             for name, each in found.items()
         }
         least = min((each.cost for each in found.values()), default=0.0)
-        go_on = set(sorted(better, key=lambda name: found[name].cost)[:FEWEST_GONE_ON])
-        go_on |= {name for name in better if promised[name] > 0.0 and found[name].cost < GONE_ON * least}
+        go_on = set(sorted(better, key=lambda name: found[name].cost)[: SELECTION.beam])
+        most = SELECTION.going_on_cost * least
+        go_on |= {name for name in better if promised[name] > 0.0 and found[name].cost < most}
         trials |= found
         self._fit(number, here, {name: trials[name] for name in ordered if name in go_on}, to_the_end=True)
         step = judged_step(here.before, here.models, number, self._library)
@@ -278,12 +273,6 @@ class EffectSearch:
             if each.model and (each.accepted or may_be_there(each, self._library))
         ]
 
-    def _evidence(self, before: EvaluatedModel, model: EvaluatedModel | str) -> float:
-        return -inf if isinstance(model, str) else evidence_for(model.fit, before.fit)
-
-    def _score(self, base: EvaluatedModel, model: EvaluatedModel) -> float:
-        return score_above(model, base)
-
     def _leaves_nothing(self, model: EvaluatedModel) -> bool:
         """Whether what is left is the noise: what repeats badly may yet be explained."""
         return model.explained and model.errors.leaves_nothing(self._split.train.record.scale_m)
@@ -323,13 +312,14 @@ class EffectSearch:
         ]
         if not found:
             return ()
-        scores = [self._score(base, each.before) for each in found]
-        as_good = [each for each, score in zip(found, scores, strict=True) if score > max(scores) - LEAST_BIC]
+        scores = [score_above(each.before, base) for each in found]
+        least = max(scores) - SELECTION.least_evidence
+        as_good = [each for each, score in zip(found, scores, strict=True) if score > least]
         fewest = min(len(each.added) for each in as_good)
         of_fewest = [each for each in as_good if len(each.added) == fewest]
         models = [each.before for each in of_fewest]
         backed = [each for each in of_fewest if not pressure_speaks_against(each.before, models)]
-        best = max(backed or of_fewest, key=lambda each: self._score(base, each.before))
+        best = max(backed or of_fewest, key=lambda each: score_above(each.before, base))
         return min(each.added for each in as_good if self._classes(each) == self._classes(best))
 
     def _classes(self, here: _Round) -> list[frozenset[str]]:
@@ -387,4 +377,4 @@ def _best(step: EffectStep) -> EvaluatedModel:
 
 def _may_stand(candidate: EffectCandidate) -> bool:
     """Whether an effect that was tried may be what is missing, better beside others than alone."""
-    return candidate.model is not None and candidate.physical and candidate.evidence > LEAST_BIC
+    return candidate.model is not None and candidate.physical and candidate.evidence > SELECTION.least_evidence

@@ -16,7 +16,7 @@ jumps past both. Hence `undetectable` asks the record itself: it is simulated wi
 so.
 """
 
-from collections.abc import Iterable, Mapping, Sequence
+from collections.abc import Iterable, Mapping
 from dataclasses import dataclass
 
 import numpy as np
@@ -30,19 +30,12 @@ from sim.effect import Effect
 from sim.interpreted import interpreted
 from workbench.data.held_out import Part, Split
 from workbench.model.free_run import FreeRun
+from workbench.select.selection_thresholds import SELECTION
 
 BACKLASH = "backlash"
 
-
-DETECTABLE = 0.3
-"""Of the floor: a change of the simulation below it does not show."""
-WIDTHS = 16
-LEAST_PLAY = 4.0
-"""Floors; a play that narrow is not worth saying."""
 STROKE_SHARES = (0.0, 0.1373, 0.3819, 0.6181, 0.8771)
 """Of the stroke: none is a multiple of another, as those of a quantum are."""
-ROUNDED = 1e-12
-"""Of the stroke: as far as lengths come out different by the arithmetic alone."""
 TAKEN_UP = 2
 """Slips after which the play has been taken up from either side, wherever the linkage stood at the start."""
 
@@ -72,25 +65,19 @@ def undetectable(split: Split, valve: ValveFile) -> tuple[Undetectable, ...]:
     if any(each.name == BACKLASH for each in valve.effect) or not valve.valve.spring_n_per_m:
         return ()
     widest_m = 2.0 * valve.valve.coulomb_n / valve.valve.spring_n_per_m
-    least_m = LEAST_PLAY * split.scale_m
+    least_m = SELECTION.least_play * split.scale_m
     if not least_m < widest_m:
         return ()
-    most_m = 0.0
-    for width_m in np.geomspace(least_m, 0.99 * widest_m, WIDTHS).tolist():
+    most_m, shown_m = 0.0, SELECTION.detectable * split.scale_m
+    for width_m in np.geomspace(least_m, 0.99 * widest_m, SELECTION.plays_tried).tolist():
         twin = with_backlash(valve, width_m)
-        if any(_apart_m(each, valve, twin) > DETECTABLE * split.scale_m for each in (split.train, split.test)):
+        if any(_apart_m(each, valve, twin) > shown_m for each in (split.train, split.test)):
             break
         most_m = width_m
-    like = ("coulomb_n", "static_n")
-    return (
-        (
-            Undetectable(
-                BACKLASH, like, most_m, valve.valve.own.length, "slow restarts in the same direction after a hold"
-            ),
-        )
-        if most_m
-        else ()
-    )
+    if not most_m:
+        return ()
+    like, shown_by = ("coulomb_n", "static_n"), "slow restarts in the same direction after a hold"
+    return (Undetectable(BACKLASH, like, most_m, valve.valve.own.length, shown_by),)
 
 
 def with_backlash(file: ValveFile, width_m: float) -> ValveFile:
@@ -162,11 +149,8 @@ def unseen_without_spring(effect: Effect, valve: ValveParameters) -> str:
     theta = [*([0.0] * len(BASE)), *effect.strengths(valve)[0]]
     places_m = [part * valve.stroke_m for part in STROKE_SHARES]
     off_m = [laws.sensor(x, x, 0.0, laws.Stem(0.0, x, 0.0, 0.0), theta, ())[1] - x for x in places_m]
-    return "shifts the indication, and a drive without a spring stands anywhere" if _all_same(off_m, valve) else ""
-
-
-def _all_same(lengths_m: Sequence[float], valve: ValveParameters) -> bool:
-    return max(lengths_m) - min(lengths_m) <= ROUNDED * valve.stroke_m
+    all_same = max(off_m) - min(off_m) <= SELECTION.same_length * valve.stroke_m
+    return "shifts the indication, and a drive without a spring stands anywhere" if all_same else ""
 
 
 def _same(name: str, library: Mapping[str, Effect]) -> frozenset[str]:

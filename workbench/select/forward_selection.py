@@ -17,9 +17,6 @@ from sim.effect import Effect
 from workbench.select.candidate_table import Tried
 from workbench.select.equivalence import algebraic_class
 
-MOST_ADDED = 3
-"""Effects added at most."""
-
 
 @dataclass(frozen=True, slots=True, repr=False)
 class Candidate(Brief):

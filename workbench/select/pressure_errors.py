@@ -18,11 +18,7 @@ from config.results.result import Brief
 from workbench.data.held_out import Part, Split
 from workbench.fit.fit_result import Fit
 from workbench.select.block_errors import block_logs, block_s, indistinguishable
-
-NEXT = 5
-"""Samples over which what is no noise of the transmitter goes on."""
-NEGLIGIBLE = 1e-3
-"""Of the standard deviation of the measured pressure: what an error below it is does not matter."""
+from workbench.select.selection_thresholds import SELECTION
 
 
 @dataclass(frozen=True, slots=True, repr=False)
@@ -46,7 +42,7 @@ def pressure_errors(fit: Fit, split: Split) -> PressureErrors | None:
     if fit.from_pressure or any(each.record.pressure_pa is None for each in parts):
         return None
     errors_pa = [_error_pa(fit, each) for each in parts]
-    scale_pa = NEGLIGIBLE * max(float(np.nanstd(_measured_pa(each))) for each in parts)
+    scale_pa = SELECTION.negligible_pressure * max(float(np.nanstd(_measured_pa(each))) for each in parts)
     logs = [
         block_logs(part.record.time_s, error_pa, scale_pa, block_s(part))
         for part, error_pa in zip(parts, errors_pa, strict=True)
@@ -57,7 +53,8 @@ def pressure_errors(fit: Fit, split: Split) -> PressureErrors | None:
 
 def _structured_pa(errors_pa: Sequence[Column]) -> float:
     """Return of errors, Pa, each (n,), what goes on over the next samples, rms; none where no two neighbours count."""
-    products = np.concatenate([each[k:] * each[:-k] for each in errors_pa for k in range(1, NEXT + 1)])
+    distances = range(1, SELECTION.noise_memory + 1)
+    products = np.concatenate([each[k:] * each[:-k] for each in errors_pa for k in distances])
     known = products[np.isfinite(products)]
     return float(np.sqrt(max(known.mean(), 0.0))) if known.size else 0.0
 

@@ -19,9 +19,7 @@ from workbench.data.held_out import Part, PressureScatter, Split, residual_m
 from workbench.fit.fit_result import Fit
 from workbench.fit.fitting import problem_of
 from workbench.select.block_errors import block_logs, block_s
-
-DRAWS = 4
-"""Of the noise, for each part."""
+from workbench.select.selection_thresholds import SELECTION
 
 
 def with_pressure_scatter(split: Split, fit: Fit) -> Split:
@@ -59,5 +57,6 @@ def _moved(part: Part, fit: Fit, noise_pa: float) -> tuple[float, Column]:
         return residual_m(part, run.run(composition.theta, run.first_onsets_s()).indicated_m)
 
     bare_m = simulated_m(0.0)
-    moved_m = [simulated_m(generator.normal(0.0, noise_pa, len(record))) - bare_m for _ in range(DRAWS)]
+    drawn_pa = (generator.normal(0.0, noise_pa, len(record)) for _ in range(SELECTION.pressure_draws))
+    moved_m = [simulated_m(each_pa) - bare_m for each_pa in drawn_pa]
     return noise_pa, np.concatenate([block_logs(record.time_s, each, 0.0, block_s(part)) for each in moved_m])

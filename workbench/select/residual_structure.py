@@ -4,34 +4,23 @@
     R^2 = (sum (e - mean)^2 - sum (e - e_hat)^2) / sum ((e - mean)^2 + n^2)
                                                      e_hat from ridge regression on the other four fifths, n negligible
 
-R^2 counts where it is no chance: -n' log(1 - R^2) > `SURELY`, n' the number of independent samples.
+R^2 counts where it is no chance: -n' log(1 - R^2), its evidence, is enough; n' the number of independent samples.
 The fifths are whole stretches of time. The residual is clipped at 5 of its robust deviations, so that one missed slip
 is not the whole of it. On noise R^2 is 0 or less.
 """
 
 from functools import lru_cache
-from itertools import combinations_with_replacement
+from itertools import combinations_with_replacement, pairwise
 
 import numpy as np
 import numpy.typing as npt
 
 from config.recording import Column
-from signals.independence import independent_share
+from signals.independence import CLIPPED, DEVIATION, independent_share
 from signals.moves import directions
 from workbench.data.motion import velocity_m_per_s
 from workbench.data.record import Record
-
-FOLDS = 5
-RIDGE = 0.03
-"""Of the number of samples; the regressors have variance 1."""
-STRUCTURED = 0.1
-"""R^2 above which the residual is not the noise's."""
-SURELY = 10.0
-"""Odds of 150 to 1."""
-CLIPPED = 5.0
-FEWEST_ROWS = 100
-STATES_KEPT = 4
-"""Of records: what was fitted and what was held out, of two diagnoses."""
+from workbench.select.selection_thresholds import SELECTION
 
 Matrix = npt.NDArray[np.float64]
 
@@ -42,10 +31,11 @@ def structure(record: Record, residual_m: Column, negligible_m: float = 0.0) -> 
     What is far below the negligible, m, has none: of a recording without noise what is left is the arithmetic's.
     """
     rows = np.flatnonzero(np.isfinite(residual_m))
-    if rows.size < FEWEST_ROWS:
+    if rows.size < SELECTION.fewest_rows:
         return 0.0
     matrix, error = _regressors(record, rows), clipped(residual_m[rows])
-    fifths = [slice(-(-k * rows.size // FOLDS), -(-(k + 1) * rows.size // FOLDS)) for k in range(FOLDS)]
+    ends = [-(-k * rows.size // SELECTION.folds) for k in range(SELECTION.folds + 1)]
+    fifths = [slice(*each) for each in pairwise(ends)]
     # Sums over a fifth, taken from those over all, are the sums over the others: nothing is copied.
     squares = [matrix[each].T @ matrix[each] for each in fifths]
     products = [matrix[each].T @ error[each] for each in fifths]
@@ -57,19 +47,19 @@ def structure(record: Record, residual_m: Column, negligible_m: float = 0.0) -> 
         n = rows.size - (here.stop - here.start)
         mean = (error.sum() - error[here].sum()) / n
         onto = all_products - products[k] - mean * (all_sums - sums[k])
-        slopes = np.linalg.solve(all_squares - squares[k] + RIDGE * n * np.eye(len(onto)), onto)
+        slopes = np.linalg.solve(all_squares - squares[k] + SELECTION.ridge * n * np.eye(len(onto)), onto)
         spread[here] = error[here] - mean
         left[here] = spread[here] - matrix[here] @ slopes
     total = float(np.sum(spread**2)) + rows.size * negligible_m**2
     found = float(np.sum(spread**2) - np.sum(left**2)) / total if total > 0.0 else 0.0
     independent = rows.size * independent_share(error)
-    return found if -independent * np.log1p(-found) > SURELY else min(found, 0.0)
+    return found if -independent * np.log1p(-found) > SELECTION.least_evidence else min(found, 0.0)
 
 
 def clipped(error_m: Column) -> Column:
     """Return the error, m, (n,), about its median, clipped at 5 of its robust deviations; NaN stays."""
     middle = float(np.nanmedian(error_m))
-    deviation = 1.4826 * float(np.nanmedian(np.abs(error_m - middle)))
+    deviation = DEVIATION * float(np.nanmedian(np.abs(error_m - middle)))
     return np.clip(error_m - middle, -CLIPPED * deviation, CLIPPED * deviation)
 
 
@@ -84,7 +74,7 @@ def _regressors(record: Record, rows: npt.NDArray[np.intp]) -> Matrix:
     return found
 
 
-@lru_cache(maxsize=STATES_KEPT)
+@lru_cache(maxsize=4)  # of what was fitted and what was held out, in two diagnoses
 def _state(record: Record) -> Matrix:
     """Return the standardised state, (n, 6): the record's own, for every model held against it."""
     state = np.zeros((len(record), 6), order="F")

@@ -28,13 +28,14 @@ from workbench.fit.likelihood import soft_weight
 from workbench.fit.minimiser import derivatives
 from workbench.fit.onsets import with_onsets
 from workbench.fit.threads import on_threads
+from workbench.select.selection_thresholds import SELECTION
 
 LENGTH_S = 24.0
+"""Of an input of the menu: small steps last half a second, others a second and more."""
 REST_S = 2.0
+"""Held at its first level before."""
 MARGIN = 0.02
 """Of the range of the commands, kept free at both ends."""
-SEPARATES = 1.2
-"""Times the noise that the wrong rival must leave: an rms over a hundred residuals scatters by 7 %, 1 / sqrt(2 n)."""
 
 Command = NDArray[np.float64]
 Shape = Callable[[Command], Command]
@@ -52,7 +53,7 @@ class Experiment(Brief):
     @property
     def separates(self) -> bool:
         """Whether the wrong rival leaves more than noise."""
-        return self.separation >= SEPARATES
+        return self.separation >= SELECTION.noise_known_to
 
     @property
     def sentence(self) -> str:
