@@ -15,7 +15,14 @@ from tests.workbench.valves import with_effect
 from workbench.compare.comparison import compare
 from workbench.data.held_out import split
 from workbench.data.record import ready
-from workbench.diagnosis.positioner_or_packing import ROUGH, PositionerOrPacking, cause, positioner_or_packing
+from workbench.diagnosis.positioner_or_packing import (
+    ROUGH,
+    Cause,
+    PositionerOrPacking,
+    Worth,
+    cause,
+    positioner_or_packing,
+)
 from workbench.fit.fitting import fit
 from workbench.imports.column_mapping import read_mapping
 from workbench.model.free_run import Accuracy, FreeRun
@@ -159,22 +166,38 @@ def test_what_is_needed_is_what_holds_the_stem(friction: bool, dead_band: bool, 
     assert cause(worth(needed=friction), worth(needed=dead_band)) == holds
 
 
+def held(by: Cause, *, needed: bool, at_floor: bool, from_pressure: bool = False) -> PositionerOrPacking:
+    friction = Worth(worth(needed=needed), 3e-4, 1e-3, at_floor)
+    dead_band = Worth(worth(needed=needed), 2e-4, 8e-4, at_floor)
+    return PositionerOrPacking(by, friction, dead_band, 3e2, 4e-3, 1e-2, found_twice=True, from_pressure=from_pressure)
+
+
 def test_that_either_does_is_said_only_of_what_is_explained() -> None:
     """Another maker's positioner left 0.7 mm of a floor of 0.02, with friction and dead band and with neither."""
-    gains = worth(needed=False), worth(needed=False)
-    figures = (*gains, 1e-3, 8e-4, 2e-4, 3e2, 4e-3, 1e-2)
-    explained, rough = (
-        PositionerOrPacking("not told", *figures, found_twice=True, at_floor=each).sentence for each in (True, False)
-    )
+    explained, rough = (held("not told", needed=False, at_floor=each).sentence for each in (True, False))
     assert explained != rough
 
 
 @pytest.mark.parametrize("at_floor", [True, False])
 def test_figures_of_a_valve_that_does_not_explain_the_recording_are_said_to_tell_nothing(at_floor: bool) -> None:
     """A stem that slips often left 0.11 mm of a noise of 0.02: friction of 119 N was told in place of 150."""
-    gains = worth(needed=True), worth(needed=True)
-    held = PositionerOrPacking("both", *gains, 1e-3, 8e-4, 2e-4, 3e2, 4e-3, 1e-2, found_twice=True, at_floor=at_floor)
-    assert (ROUGH in held.sentence) != at_floor
+    assert (ROUGH in held("both", needed=True, at_floor=at_floor).sentence) != at_floor
+
+
+@pytest.mark.parametrize(
+    ("from_pressure", "errors"),
+    [
+        (False, "0.2 mm with friction and dead band, 0.8 without dead band, 1 without friction"),
+        (
+            True,
+            "from the measured pressure 0.3 mm with friction, 1 without; "
+            "from the set point 0.2 mm with dead band too, 0.8 without dead band",
+        ),
+    ],
+)
+def test_each_error_is_said_of_what_it_was_asked_from(from_pressure: bool, errors: str) -> None:
+    said = held("both", needed=True, at_floor=True, from_pressure=from_pressure).sentence
+    assert said.endswith(f" (held-out errors: {errors}).")
 
 
 SMALL = {

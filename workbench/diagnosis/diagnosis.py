@@ -32,8 +32,8 @@ from workbench.fit.fit_result import Fit
 from workbench.fit.threads import linear_algebra_alone
 from workbench.model.simulation_regime import sampling
 from workbench.select.candidate_table import candidate_columns, candidate_table, draw_race, lengths
-from workbench.select.effect_candidates import EffectCandidate, EffectStep, EvaluatedModel
-from workbench.select.effect_search import EffectSearch, Progress, Race
+from workbench.select.effect_candidates import EffectCandidate, EvaluatedModel
+from workbench.select.effect_search import EffectSearch, Progress, Race, model_after
 from workbench.select.equivalence import undetectable, unseen_without_spring
 from workbench.select.forward_selection import ForwardSelection
 from workbench.select.separating_experiment import Experiment
@@ -247,7 +247,7 @@ def diagnose(
             if on_preview:
                 on_preview(scores)
             steps = search.steps(base)
-            best = _last(steps)
+            best = model_after(steps[-1])
             landed = judged_landings(best.fit, parts)
             bare = Case(
                 verdict=verdict(best, steps, parts.motion_std_m, parts.floor_m, landed, parts.early),
@@ -265,7 +265,7 @@ def diagnose(
             chosen = search.experiment(steps) if found == "one_of" else None
     except (BrokenOff, KeyboardInterrupt):
         steps, found, chosen, doubts = search.so_far(base), "unfinished", None, ()
-        best = _last(steps)
+        best = model_after(steps[-1])
     return Diagnosis(
         steps=steps,
         verdict=found,
@@ -281,9 +281,3 @@ def diagnose(
         positioner=held,
         doubts=doubts,
     )
-
-
-def _last(steps: Sequence[EffectStep]) -> EvaluatedModel:
-    """Return what the steps have come to."""
-    added = steps[-1].added
-    return added.model if added and added.model else steps[-1].before

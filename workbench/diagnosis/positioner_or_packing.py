@@ -44,32 +44,37 @@ ROUGH = "But the valve with both does not explain the recording: these figures a
 NOTHING = Gain(0.0, 0.0, 0.0)
 
 
+class Worth(NamedTuple):
+    """What something is worth, and the held-out rms errors with and without it, m."""
+
+    gain: Gain
+    with_m: float
+    without_m: float
+    at_floor: bool
+    """Whether with it nothing is left that is known to be more than the floor; so it is taken where none is known."""
+
+
 @dataclass(frozen=True, slots=True, repr=False)
 class PositionerOrPacking(Brief):
     """What holds the stem, and what each of the two is worth against the valve without it."""
 
     cause: Cause
-    friction: Gain
-    dead_band: Gain
-    without_friction_m: float
-    without_dead_band_m: float
-    with_both_m: float
-    """Held-out rms errors."""
+    friction: Worth
+    dead_band: Worth
+    """From the set point, with friction."""
     friction_n: float
     dead_band_m: float
     play_m: float
     """What friction alone leaves unanswered, 2 F_c / k_s."""
     found_twice: bool
     """Whether a second search came as low; its parameters may differ in what the recording does not determine."""
-    with_friction_m: float | None = None
-    """Held-out rms error from the measured pressure; None where none was measured, and all are from the set point."""
-    at_floor: bool = True
-    """Whether the valve with both explains the recording from the set point; so it is taken where no floor is known."""
+    from_pressure: bool
+    """Whether friction was judged from the measured pressure; else that is from the set point, too."""
 
     @property
     def sentence(self) -> str:
         """Say it."""
-        rough = "" if self.at_floor or self.cause == "not told" else f". {ROUGH}"
+        rough = "" if self.dead_band.at_floor or self.cause == "not told" else f". {ROUGH}"
         return f"{self._said}{rough} ({self._held})."
 
     @property
@@ -80,7 +85,7 @@ class PositionerOrPacking(Brief):
         besides = "holds the stem, too, is not known"
         neither = (
             "either alone explains it"
-            if self.at_floor
+            if self.dead_band.at_floor
             else "neither is needed, and with both the valve does not explain it"
         )
         if self.cause == "not told" and not self.found_twice:
@@ -100,16 +105,13 @@ class PositionerOrPacking(Brief):
     @property
     def _held(self) -> str:
         """Say the held-out errors."""
-        without_mm, both_mm = 1e3 * self.without_friction_m, 1e3 * self.with_both_m
-        band = f"{1e3 * self.without_dead_band_m:.3g} without dead band"
-        if self.with_friction_m is None:
-            return (
-                f"held-out errors: {both_mm:.3g} mm with friction and dead band, {band}, {without_mm:.3g} without "
-                "friction"
-            )
+        without, both = f"{1e3 * self.friction.without_m:.3g} without", f"{1e3 * self.dead_band.with_m:.3g} mm with"
+        band = f"{1e3 * self.dead_band.without_m:.3g} without dead band"
+        if not self.from_pressure:
+            return f"held-out errors: {both} friction and dead band, {band}, {without} friction"
         return (
-            f"held-out errors: from the measured pressure {1e3 * self.with_friction_m:.3g} mm with friction, "
-            f"{without_mm:.3g} without; from the set point {both_mm:.3g} mm with dead band too, {band}"
+            f"held-out errors: from the measured pressure {1e3 * self.friction.with_m:.3g} mm with friction, "
+            f"{without}; from the set point {both} dead band too, {band}"
         )
 
 
@@ -180,18 +182,7 @@ def _asked(
     ):
         found = "at least positioner"
     return PositionerOrPacking(
-        found,
-        friction.gain,
-        band.gain,
-        friction.without_m,
-        band.without_m,
-        band.with_m,
-        valve.coulomb_n,
-        band_m,
-        play_m,
-        banded.trusted,
-        friction.with_m if stem.from_pressure else None,
-        band.at_floor,
+        found, friction, band, valve.coulomb_n, band_m, play_m, banded.trusted, stem.from_pressure
     )
 
 
@@ -200,20 +191,10 @@ def _excluded(other: Fit, found: Fit, split: Split) -> bool:
     return _worth(other, found, split).gain.bic > SELECTION.least_evidence
 
 
-class _Worth(NamedTuple):
-    """What something is worth, and the held-out rms errors with and without it, m."""
-
-    gain: Gain
-    with_m: float
-    without_m: float
-    at_floor: bool
-    """Whether with it nothing is left that is known to be more than the floor."""
-
-
-def _worth(bare: Fit, full: Fit, split: Split) -> _Worth:
+def _worth(bare: Fit, full: Fit, split: Split) -> Worth:
     without, there = block_errors(bare, split), block_errors(full, split)
     at_floor = split.floor_m is None or there.at_floor(split.floor_m)
-    return _Worth(gain(bare, full, without, there), there.test_rmse_m, without.test_rmse_m, at_floor)
+    return Worth(gain(bare, full, without, there), there.test_rmse_m, without.test_rmse_m, at_floor)
 
 
 def cause(friction: Gain, dead_band: Gain) -> Cause:

@@ -328,7 +328,7 @@ class EffectSearch:
 
     def _asked_beside(self, step: EffectStep, later: Sequence[EffectStep]) -> EffectStep:
         """Return a step with what does as well as the added one beside what later steps have added, too."""
-        added, last = step.added, _best(later[-1] if later else step)
+        added, last = step.added, model_after(later[-1] if later else step)
         if added is None or all(each.added is None for each in later) or not last.explained:
             return step
         own = algebraic_class(added.name, self._library)
@@ -371,7 +371,8 @@ def _one_of_each(found: Sequence[_Round]) -> list[_Round]:
     return kept
 
 
-def _best(step: EffectStep) -> EvaluatedModel:
+def model_after(step: EffectStep) -> EvaluatedModel:
+    """Return what a step has come to."""
     return step.added.model if step.added and step.added.model else step.before
 
 
