@@ -60,8 +60,7 @@ class BlockErrors(Brief):
         """
         if floor_m is None:
             return False
-        typical = max(self.train_block_m, self.test_block_m) <= SELECTION.at_floor * floor_m
-        return typical and self.rms_floors(floor_m) <= SELECTION.rarely_off
+        return self._typical_m <= SELECTION.at_floor * floor_m and self.rms_floors(floor_m) <= SELECTION.rarely_off
 
     def rms_floors(self, floor_m: float) -> float:
         """Return the rms, fitted or held out, whichever is more, in floors."""
@@ -69,7 +68,7 @@ class BlockErrors(Brief):
 
     def floors_left(self, floor_m: float) -> float:
         """Return what is left, in floors: a typical event's error or the rms, fitted or held out, the most of them."""
-        return max(max(self.train_block_m, self.test_block_m) / floor_m, self.rms_floors(floor_m))
+        return max(self._typical_m / floor_m, self.rms_floors(floor_m))
 
     def leaves_nothing(self, floor_m: float | None) -> bool:
         """Whether what is left of a record that is explained is the floor, so that another effect has no room in it."""
@@ -77,7 +76,11 @@ class BlockErrors(Brief):
 
     def follows(self, motion_std_m: float) -> bool:
         """Whether a typical event's error is small against the motion, given by its standard deviation, m."""
-        return max(self.train_block_m, self.test_block_m) <= SELECTION.most_left * motion_std_m
+        return self._typical_m <= SELECTION.most_left * motion_std_m
+
+    @property
+    def _typical_m(self) -> float:
+        return max(self.train_block_m, self.test_block_m)
 
 
 def errors_json(errors: BlockErrors) -> dict[str, float]:
@@ -248,20 +251,16 @@ def _rms(error_m: Column) -> float:
     return float(np.sqrt(np.nanmean(error_m**2)))
 
 
-def block_s(part: Part) -> float:
-    """Return the length of a block of time of a part, s."""
-    return max(BLOCK_S, SELECTION.fewest_block_samples * part.record.period_s)
-
-
-def block_logs(time_s: Column, error: Column, negligible: float, block_s: float = BLOCK_S) -> Column:
+def block_logs(time_s: Column, error: Column, negligible: float, period_s: float = 0.0) -> Column:
     """Return the log rms of an error in each block of time that has samples which count, (blocks,).
 
     Args:
         time_s: time, s, (samples,).
         error: in any unit, (samples,); NaN where a sample does not count.
         negligible: added in quadrature, so that what is far below it makes no difference.
-        block_s: length of a block, s.
+        period_s: of the samples, s: where they are rare, blocks are longer.
     """
+    block_s = max(BLOCK_S, SELECTION.fewest_block_samples * period_s)
     rows = np.flatnonzero(np.isfinite(error))
     _, block = np.unique(np.floor((time_s[rows] - time_s[0]) / block_s), return_inverse=True)
     squares = np.bincount(block, error[rows] ** 2) / np.bincount(block)

@@ -11,6 +11,7 @@ from config.results.result import Brief
 from config.valve_file import ValveParameters
 from sim.effect import Effect, Parameter
 from workbench.fit.fit_result import Fit
+from workbench.fit.fit_thresholds import FIT
 from workbench.fit.parameter_estimate import parameters_json
 from workbench.select.block_errors import BlockErrors, errors_json
 from workbench.select.candidate_table import Tried
@@ -207,7 +208,7 @@ def _best(
     assert best.model
     assert first.model
     # A class is not ranked inside, but a search that failed is no reason to go on from there.
-    as_near = first.model.fit.cost < SELECTION.same_cost * best.model.fit.cost
+    as_near = first.model.fit.cost < FIT.ends.same_cost * best.model.fit.cost
     return ordered, first if as_near and first.model.explained == best.model.explained else best
 
 

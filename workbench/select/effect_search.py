@@ -191,17 +191,15 @@ class EffectSearch:
         beside = self._beside(here)
         first = [name for name, each in beside.items() if each.after not in self._library]
         self._fit_beside(number, here, first if number == 1 else self._screen(here, first))
-        evident = {
-            name
-            for name, each in here.models.items()
-            if not isinstance(each, str) and evidence_for(each.fit, here.before.fit) > SELECTION.least_evidence
-        }
+        fitted = {name: each for name, each in here.models.items() if not isinstance(each, str)}
+        before, least = here.before.fit, SELECTION.least_evidence
+        evident = {name for name, each in fitted.items() if evidence_for(each.fit, before) > least}
         after = [
             name
             for name, each in beside.items()
             if each.after in self._library and (each.after in evident or each.after in here.added)
         ]
-        if after and not any(self._leaves_nothing(each) for each in here.models.values() if not isinstance(each, str)):
+        if after and not any(map(self._leaves_nothing, fitted.values())):
             self._fit_beside(number, here, after)
 
     def _fit_beside(self, number: int, here: _Round, names: Sequence[str]) -> None:
@@ -362,13 +360,10 @@ def evaluated(fit: Fit, split: Split) -> EvaluatedModel:
 
 def _one_of_each(found: Sequence[_Round]) -> list[_Round]:
     """Return rounds without those that have the same effects as one before, in another order."""
-    seen: set[frozenset[str]] = set()
-    kept = []
+    kept: dict[frozenset[str], _Round] = {}
     for each in found:
-        if frozenset(each.added) not in seen:
-            seen.add(frozenset(each.added))
-            kept.append(each)
-    return kept
+        kept.setdefault(frozenset(each.added), each)
+    return list(kept.values())
 
 
 def model_after(step: EffectStep) -> EvaluatedModel:

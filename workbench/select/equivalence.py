@@ -69,6 +69,7 @@ def undetectable(split: Split, valve: ValveFile) -> tuple[Undetectable, ...]:
     if not least_m < widest_m:
         return ()
     most_m, shown_m = 0.0, SELECTION.detectable * split.scale_m
+    # The widest would leave no Coulomb friction at all.
     for width_m in np.geomspace(least_m, 0.99 * widest_m, SELECTION.plays_tried).tolist():
         twin = with_backlash(valve, width_m)
         if any(_apart_m(each, valve, twin) > shown_m for each in (split.train, split.test)):

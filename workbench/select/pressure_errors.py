@@ -17,7 +17,7 @@ from config.recording import Column
 from config.results.result import Brief
 from workbench.data.held_out import Part, Split
 from workbench.fit.fit_result import Fit
-from workbench.select.block_errors import block_logs, block_s, indistinguishable
+from workbench.select.block_errors import block_logs, indistinguishable
 from workbench.select.selection_thresholds import SELECTION
 
 
@@ -44,7 +44,7 @@ def pressure_errors(fit: Fit, split: Split) -> PressureErrors | None:
     errors_pa = [_error_pa(fit, each) for each in parts]
     scale_pa = SELECTION.negligible_pressure * max(float(np.nanstd(_measured_pa(each))) for each in parts)
     logs = [
-        block_logs(part.record.time_s, error_pa, scale_pa, block_s(part))
+        block_logs(part.record.time_s, error_pa, scale_pa, part.record.period_s)
         for part, error_pa in zip(parts, errors_pa, strict=True)
     ]
     rms_pa = float(np.sqrt(np.nanmean(np.concatenate(errors_pa) ** 2)))

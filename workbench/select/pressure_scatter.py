@@ -18,7 +18,7 @@ from sim.composition import Composition
 from workbench.data.held_out import Part, PressureScatter, Split, residual_m
 from workbench.fit.fit_result import Fit
 from workbench.fit.fitting import problem_of
-from workbench.select.block_errors import block_logs, block_s
+from workbench.select.block_errors import block_logs
 from workbench.select.selection_thresholds import SELECTION
 
 
@@ -59,4 +59,4 @@ def _moved(part: Part, fit: Fit, noise_pa: float) -> tuple[float, Column]:
     bare_m = simulated_m(0.0)
     drawn_pa = (generator.normal(0.0, noise_pa, len(record)) for _ in range(SELECTION.pressure_draws))
     moved_m = [simulated_m(each_pa) - bare_m for each_pa in drawn_pa]
-    return noise_pa, np.concatenate([block_logs(record.time_s, each, 0.0, block_s(part)) for each in moved_m])
+    return noise_pa, np.concatenate([block_logs(record.time_s, each, 0.0, record.period_s) for each in moved_m])

@@ -51,7 +51,8 @@ class SelectionThresholds:
     negligible_pressure: float = 1e-3
     """Of the measured pressure's standard deviation: what an error below it is does not matter."""
     fewest_block_samples: int = 10
-    """In a block of time: its rms is then known to 22 %, 1 / sqrt(2 n)."""
+    """In a block of time, which is longer than a second where that holds fewer: its rms is then known to 22 %,
+    1 / sqrt(2 n)."""
     noise_memory: int = 5
     """Samples over which what is no noise of a pressure transmitter goes on."""
     pressure_draws: int = 4
@@ -78,8 +79,6 @@ class SelectionThresholds:
     going_on_cost: float = 10.0
     """Factor on the least cost of the effects tried beside a model, up to which another is searched to its end, if it
     has any evidence: what is left of a coarse search lowers its cost by a tenth, seldom by half, rarely by more."""
-    same_cost: float = 1.01
-    """Factor on the cost within which two members of a class came out as the one they are."""
     at_end: float = 0.2
     """Of the weakest start of a parameter: nearer to the end of its range it is at it."""
 
