@@ -229,7 +229,8 @@ class Likelihood:
         sums = np.add.reduceat(e[rows.resting], rows.starts) if rows.starts.size else np.empty(0)
         mean = np.bincount(rows.rest_of, sums) / rows.per_rest
         blocks = (sums / rows.count - mean[rows.rest_of]) * np.sqrt(rows.count)
-        return Groups(e[rows.moving], mean * self.sigma_m / self.landing_m, blocks, self.break_rows(path, theta))
+        (broken,) = self.rows_of_static(path, theta[STATIC : STATIC + 1])
+        return Groups(e[rows.moving], mean * self.sigma_m / self.landing_m, blocks, broken)
 
     def cost(self, r: Vector) -> float:
         """Return the soft-L1 cost of some residuals, (rows,)."""
@@ -239,10 +240,6 @@ class Likelihood:
         """Return the residuals of landings, wide, and of break-aways: what leads a search that begins far off."""
         landed = groups.landings * self.landing_m / (FIT.descent.wide_landings * self.sigma_m)
         return np.concatenate([landed, groups.break_aways])
-
-    def break_rows(self, path: ToldPath, theta: Vector) -> Vector:
-        """Return the residuals of the second factor."""
-        return np.asarray(self.rows_of_static(path, theta[STATIC : STATIC + 1])[0])
 
     def rows_of_static(self, path: ToldPath, static_n: Vector, wider: Vector | float = 1.0) -> Vector:
         """Return the residuals of the second factor with each of some static frictions, N, (frictions, rows).

@@ -19,7 +19,7 @@ alone, so that a start far off finds its valley there.
 """
 
 from collections.abc import Callable
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import NamedTuple
 
 import numpy as np
@@ -93,7 +93,7 @@ def minimise(ground: Ground, begin: Place, effort: Effort) -> Place:
         return rows(place)
 
     here = Place(*(np.clip(at, low, high) for at, low, high in zip(begin, ground.low, ground.high, strict=True)))
-    ground = Ground(simulated, ground.of, ground.low, ground.high)
+    ground = replace(ground, rows=simulated)
     r = ground.rows(here)
     cost, slopes, fresh, damping, idle = ground.cost(r), ground.slopes(here, r), True, FIT.damping.first, False
     while left > 0 and damping <= FIT.damping.most:
