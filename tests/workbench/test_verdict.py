@@ -11,6 +11,7 @@ from tests.workbench.valves import SEED
 from workbench.data.held_out import Split, split
 from workbench.diagnosis.diagnosis import Diagnosis
 from workbench.diagnosis.diagnosis_json import as_json
+from workbench.diagnosis.doubt import Case
 from workbench.diagnosis.error_before_fit import AsGiven
 from workbench.diagnosis.extension import extension_of
 from workbench.diagnosis.judged_landings import JudgedLandings
@@ -20,6 +21,7 @@ from workbench.fit.fit_result import Term
 from workbench.fit.parameter_estimate import Fitted
 from workbench.model.simulation_regime import Motion, Sampling
 from workbench.select.effect_candidates import EffectStep, EvaluatedModel, judged_step
+from workbench.select.effect_search import model_after
 
 POOR = model_of(cost=20.0 * AT_FLOOR, error_m=20.0 * FLOOR_M)
 EXPLAINED = model_of(cost=1.2 * AT_FLOOR, error_m=1.2 * FLOOR_M)
@@ -38,21 +40,28 @@ def step(before: EvaluatedModel, number: int = 1, **models: EvaluatedModel) -> E
 
 
 def diagnosed(parts: Split, *steps: EffectStep, given_m: float = FLOOR_M) -> Diagnosis:
-    added = steps[-1].added
-    best = added.model if added and added.model else steps[-1].before
-    found = verdict(best, steps, parts.motion_std_m, parts.floor_m)
-    given = AsGiven(errors_of(given_m), FLOOR_M)
-    sentence = verdict_sentence(found, best, steps, LIBRARY, parts, given)
+    best = model_after(steps[-1])
+    case = Case(
+        verdict=verdict(best, steps, parts.motion_std_m, parts.floor_m),
+        best=best,
+        steps=steps,
+        valve=best.fit.valve,
+        library=LIBRARY,
+        parts=parts,
+        given=AsGiven(errors_of(given_m), FLOOR_M),
+        workers=1,
+        progress=lambda _what, _done: None,
+    )
     return Diagnosis(
         steps=steps,
-        verdict=found,
+        verdict=case.verdict,
         base=steps[0].before,
         best=best,
         preview=(),
         experiment=None,
         split=parts,
-        given=given,
-        sentence=sentence,
+        given=case.given,
+        sentence=verdict_sentence(case),
     )
 
 

@@ -5,7 +5,7 @@ accepted (`effect_candidates`, by the rule of `effect_acceptance`), from all ste
 """
 
 from collections.abc import Callable, Mapping, Sequence
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from os import cpu_count
 from typing import TYPE_CHECKING, TypeVar
 
@@ -233,7 +233,18 @@ def diagnose(
     with ending(is_over):
         base = search.base(valve)
     parts = search.split
-    given = AsGiven.of(valve, parts, base.fit)
+    case = Case(
+        verdict="unfinished",
+        best=base,
+        steps=(),
+        valve=valve,
+        library=library,
+        parts=parts,
+        given=AsGiven.of(valve, parts, base.fit),
+        workers=threads,
+        progress=tell,
+    )
+    chosen = None
     scores: tuple[TangentScore, ...] = ()
     held = None
     try:
@@ -249,35 +260,24 @@ def diagnose(
             steps = search.steps(base)
             best = model_after(steps[-1])
             landed = judged_landings(best.fit, parts)
-            bare = Case(
-                verdict=verdict(best, steps, parts.motion_std_m, parts.floor_m, landed, parts.early),
-                best=best,
-                steps=steps,
-                valve=valve,
-                library=library,
-                parts=parts,
-                given=given,
-                workers=threads,
-                progress=tell,
-            )
-            case = with_doubts(bare)
-            found, doubts = case.outcome, case.doubts
-            chosen = search.experiment(steps) if found == "one_of" else None
+            found = verdict(best, steps, parts.motion_std_m, parts.floor_m, landed, parts.early)
+            doubted = with_doubts(replace(case, verdict=found, best=best, steps=steps))
+            chosen = search.experiment(steps) if doubted.outcome == "one_of" else None
+            case = doubted
     except (BrokenOff, KeyboardInterrupt):
-        steps, found, chosen, doubts = search.so_far(base), "unfinished", None, ()
-        best = model_after(steps[-1])
+        steps = search.so_far(base)
+        case = replace(case, best=model_after(steps[-1]), steps=steps)
     return Diagnosis(
-        steps=steps,
-        verdict=found,
+        steps=case.steps,
+        verdict=case.outcome,
         base=base,
-        best=best,
+        best=case.best,
         preview=scores,
         experiment=chosen,
         split=parts,
-        given=given,
-        sentence=verdict_sentence(found, best, steps, library, parts, given)
-        + "".join(f" But {each.sentence(best.fit.kind)}." for each in doubts),
+        given=case.given,
+        sentence=verdict_sentence(case),
         unseen=unseen,
         positioner=held,
-        doubts=doubts,
+        doubts=case.doubts,
     )

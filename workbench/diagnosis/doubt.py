@@ -6,7 +6,7 @@ Each check is a file of its own; `doubts` has their order. A check sees what tho
 measured pressure does not drive nobody asks for the mass.
 """
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Mapping
 from dataclasses import dataclass
 from typing import Any, ClassVar
 
@@ -44,7 +44,7 @@ class Case:
 
     verdict: Verdict
     best: EvaluatedModel
-    steps: Sequence[EffectStep]
+    steps: tuple[EffectStep, ...]
     valve: ValveFile
     """As it was diagnosed."""
     library: Mapping[str, Effect]

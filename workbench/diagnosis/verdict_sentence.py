@@ -9,9 +9,10 @@ from sim.effect import Effect
 from workbench.data.held_out import Split
 from workbench.data.noise_floor import UNKNOWN
 from workbench.diagnosis.diagnosis_thresholds import DIAGNOSIS
+from workbench.diagnosis.doubt import Case
 from workbench.diagnosis.error_before_fit import AsGiven
 from workbench.diagnosis.judged_landings import unknown_between_samples
-from workbench.diagnosis.verdict import EXPLAINED, Verdict, by_another_name
+from workbench.diagnosis.verdict import Verdict, by_another_name
 from workbench.fit.fit_result import Fit
 from workbench.select.block_errors import BlockErrors
 from workbench.select.effect_candidates import EffectCandidate, EffectStep, EvaluatedModel
@@ -29,27 +30,15 @@ def verdict_line(verdict: Verdict, sentence: str) -> str:
     return f"{word}: {sentence.removeprefix(f'{verdict.capitalize()}: ')}"
 
 
-def verdict_sentence(
-    verdict: Verdict,
-    best: EvaluatedModel,
-    steps: Sequence[EffectStep],
-    library: Mapping[str, Effect],
-    parts: Split,
-    given: AsGiven,
-) -> str:
-    """Return the verdict in one or a few sentences, in the names and units of what was diagnosed."""
-    said = _said(verdict, best, steps, library, parts, given)
-    return best.fit.kind.text(said + (_no_break_away(best.fit) if verdict in EXPLAINED else ""))
+def verdict_sentence(case: Case) -> str:
+    """Return the verdict and its doubts in a few sentences, in the names and units of what was diagnosed."""
+    kind = case.best.fit.kind
+    said = kind.text(_said(case) + (_no_break_away(case.best.fit) if case.explained else ""))
+    return said + "".join(f" But {each.sentence(kind)}." for each in case.doubts)
 
 
-def _said(
-    verdict: Verdict,
-    best: EvaluatedModel,
-    steps: Sequence[EffectStep],
-    library: Mapping[str, Effect],
-    parts: Split,
-    given: AsGiven,
-) -> str:
+def _said(case: Case) -> str:
+    verdict, best, steps, library, parts = case.outcome, case.best, case.steps, case.library, case.parts
     length = best.fit.kind.length
     names = " and ".join(step.added.name for step in steps if step.added)
     fell = reduction_sentence(steps[0].before.errors, best.errors, length)
@@ -58,12 +47,12 @@ def _said(
     apart = "".join(rivals_sentence([each.name for each in step.indistinguishable], library) for step in steps)
     by_pressure = "".join(_by_pressure(step, best.fit.kind) for step in steps)
     off = _kept_off(by_another_name(steps), best)
-    if off and verdict in EXPLAINED:
+    if off and case.explained:
         begun = f"Missing: {names}{or_another}; {fell}. But" if names else "No effect is missing, but"
         return f"{begun} {off}{apart}"
     suspicion = _suspicion(steps[-1].suspected)
     if verdict == "adequate":
-        said = _adequate(best.errors, parts, length, given)
+        said = _adequate(best.errors, parts, length, case.given)
         return said + suspicion + _scatter(parts, length)
     if verdict in ("missing", "one_of"):
         all_known = verdict == "one_of" and _floors_left(best.errors, parts) <= SELECTION.noise_known_to
@@ -80,7 +69,7 @@ def _said(
         said = f"Something is missing that {lacked}.{begun}"
         loose = BREAKS_ELSEWHERE if best.breaks_elsewhere else ""
         return f"{said}{loose}{suspicion}{repeat}{_scatter(parts, length)}"
-    return _unproved(verdict, best, steps, library, parts) + begun + (suspicion if verdict == "untrusted" else "")
+    return _unproved(case) + begun + (suspicion if verdict == "untrusted" else "")
 
 
 def _tells(candidate: EffectCandidate) -> bool:
@@ -149,17 +138,16 @@ def _left(errors: BlockErrors, parts: Split, suspected: Sequence[EffectCandidate
     return f"{floors:.2g} times the floor is left, which no other effect {explains}"
 
 
-def _unproved(
-    verdict: Verdict, best: EvaluatedModel, steps: Sequence[EffectStep], library: Mapping[str, Effect], parts: Split
-) -> str:
+def _unproved(case: Case) -> str:
     """Say why nothing is judged."""
-    if verdict == "unjudged":
-        return f"Not judged: {_not_known(best, parts)}"
-    if verdict == "untrusted":
+    if case.outcome == "unjudged":
+        return f"Not judged: {_not_known(case.best, case.parts)}"
+    if case.outcome == "untrusted":
         return "Not to be trusted: searches from independent starts end at different parameters."
-    tried = sum(each.model is not None for each in steps[-1].candidates)
-    missing = sum(name not in steps[-1].before.effects for name in library)
-    return f"Broken off in step {len(steps)}, with {tried} of {missing} effects refitted; nothing is judged."
+    last = case.steps[-1]
+    tried = sum(each.model is not None for each in last.candidates)
+    missing = sum(name not in last.before.effects for name in case.library)
+    return f"Broken off in step {len(case.steps)}, with {tried} of {missing} effects refitted; nothing is judged."
 
 
 def _not_known(best: EvaluatedModel, parts: Split) -> str:
