@@ -18,7 +18,7 @@ from workbench.fit.fit_problem import problem
 from workbench.fit.fit_result import Counted, terms
 from workbench.fit.fit_thresholds import FIT, Effort
 from workbench.fit.fitting import fit
-from workbench.fit.likelihood import Groups, Likelihood, soft
+from workbench.fit.likelihood import Groups, Likelihood, cost_of, soft
 from workbench.fit.minimiser import End, derivatives, descend
 from workbench.fit.uncertainty import uncertainty
 
@@ -94,7 +94,7 @@ def test_a_combination_names_who_takes_part_in_it_and_by_which_power() -> None:
     seen = np.random.default_rng(1).standard_normal((like.count, 4)) @ (np.eye(4) - np.outer(open_, open_))
     groups = like.at(like.composition.theta, like.run.first_onsets_s())
     z = like.coordinates(like.composition.theta)
-    (found,) = uncertainty(like, End(z, np.empty(0), like.cost(groups.whole), groups, seen)).undetermined
+    (found,) = uncertainty(like, End(z, np.empty(0), cost_of(groups.whole), groups, seen)).undetermined
     assert found.names == tuple(each.name for each in like.parameters[:3])
     assert found.powers == pytest.approx(open_[:3] / open_[0])
 

@@ -14,7 +14,7 @@ from workbench.data.record import Record, ready
 from workbench.fit.fit_problem import problem
 from workbench.fit.fit_thresholds import FIT
 from workbench.fit.fitting import fit
-from workbench.fit.likelihood import Likelihood, layout, soft, soft_weight
+from workbench.fit.likelihood import Likelihood, cost_of, layout, soft, soft_weight
 from workbench.fit.minimiser import Ground, Place, minimise
 from workbench.fit.onsets import with_onsets
 from workbench.model.free_run import FreeRun
@@ -168,4 +168,4 @@ def test_a_search_goes_on_over_edges_finer_than_its_steps(seed: int) -> None:
     none, begin = np.empty(0), np.array([1.0, -0.7])
     ground = Ground(rows, np.zeros(43, dtype=np.int64), Place(begin - 5.0, none), Place(begin + 5.0, none))
     end = minimise(ground, Place(begin, none), FIT.descent.whole)
-    assert ground.cost(rows(end)) < 0.5 * ground.cost(rows(Place(begin, none)))
+    assert cost_of(rows(end)) < 0.5 * cost_of(rows(Place(begin, none)))

@@ -15,7 +15,7 @@ import numpy as np
 
 from sim.karnopp import Vector
 from workbench.fit.fit_thresholds import FIT
-from workbench.fit.likelihood import Likelihood, coupling, soft_weight
+from workbench.fit.likelihood import Likelihood, cost_of, coupling, soft_weight
 from workbench.fit.minimiser import End, descend
 from workbench.fit.onsets import with_onsets
 from workbench.fit.uncertainty import uncertainty
@@ -26,7 +26,7 @@ def settle(like: Likelihood, end: End) -> tuple[End, ...]:
 
     At low speeds a stem may creep on or stick: whether F_s holds it then, only the record can tell.
     """
-    cost = like.cost(like.at(like.theta(end.z), end.onsets_s).whole)
+    cost = cost_of(like.at(like.theta(end.z), end.onsets_s).whole)
     if cost == end.cost:
         return (_settle_by(like, replace(end, is_eased=like.is_eased)),)
     there = descend(like, end.z, with_onsets(like, like.theta(end.z))[0])
@@ -37,7 +37,7 @@ def _settle_by(like: Likelihood, end: End) -> End:
     """Search on where other onsets suit the valve better than those that a search came to, as long as it pays."""
     for _ in range(FIT.ends.settle_rounds):
         onsets_s, groups = with_onsets(like, like.theta(end.z))
-        if like.cost(groups.whole) > end.cost - FIT.ends.same_nats:
+        if cost_of(groups.whole) > end.cost - FIT.ends.same_nats:
             break
         there = descend(like, end.z, onsets_s)
         end = min(end, there, key=lambda each: each.cost)
@@ -69,18 +69,17 @@ def _cheapest(
     like: Likelihood, end: End, root: Vector, follow: Vector, generator: np.random.Generator
 ) -> tuple[Vector, Vector]:
     """Return the coordinates and onsets, s, of the cheapest of some places drawn about an end."""
-    ends = np.array([each.bounds for each in like.parameters])
     normal = generator.standard_normal((FIT.ends.draws, end.z.size))
     steps = np.clip(
         FIT.ends.spread_deviations * np.linalg.lstsq(root, normal.T)[0].T, -FIT.damping.longest, FIT.damping.longest
     )
-    places = np.clip(end.z + steps, ends[:, 0], ends[:, 1])
+    places = np.clip(end.z + steps, *like.bounds)
     earliest_s, latest_s = like.run.bounds_s(FIT.onsets.reach_periods)
     onsets_s = [
         np.clip(end.onsets_s + like.run.period_s * np.clip(follow @ (z - end.z), -1.0, 1.0), earliest_s, latest_s)
         for z in places
     ]
-    costs = [like.cost(like.at(like.theta(z), o).whole) for z, o in zip(places, onsets_s, strict=True)]
+    costs = [cost_of(like.at(like.theta(z), o).whole) for z, o in zip(places, onsets_s, strict=True)]
     best = int(np.argmin(costs))
     return places[best], onsets_s[best]
 

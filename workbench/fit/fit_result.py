@@ -22,7 +22,7 @@ from workbench.data.noise_floor import say_m
 from workbench.data.record import Record, ready
 from workbench.fit.fit_problem import Problem
 from workbench.fit.fit_thresholds import FIT
-from workbench.fit.likelihood import Groups, Likelihood, Rows, soft
+from workbench.fit.likelihood import Groups, Likelihood, Rows, cost_of, soft
 from workbench.fit.minimiser import End
 from workbench.fit.parameter_estimate import Fitted, draw_parameters, parameter_columns, parameter_table
 from workbench.fit.uncertainty import Combination, Uncertainty, uncertainty
@@ -238,13 +238,13 @@ def _as_runs_freely(like: Likelihood, end: End, determined: Uncertainty) -> End:
         return z
 
     def cost(z: Vector) -> float:
-        return like.cost(like.at(like.theta(z), end.onsets_s).whole)
+        return cost_of(like.at(like.theta(z), end.onsets_s).whole)
 
     trials = [end.z, *(each for each in map(placed, open_) if cost(each) <= end.cost + FIT.intervals.rise_nats)]
     errors = [np.nanmean((run.position_m(like.theta(z)) - seen_m) ** 2) for z in trials]
     best = trials[int(np.nanargmin(errors))] if np.isfinite(errors).any() else end.z
     groups = like.at(like.theta(best), end.onsets_s)
-    return replace(end, z=best, groups=groups, cost=like.cost(groups.whole))
+    return replace(end, z=best, groups=groups, cost=cost_of(groups.whole))
 
 
 class Counted(NamedTuple):

@@ -23,7 +23,7 @@ from workbench.fit.ends import search_about, settle
 from workbench.fit.fit_problem import Problem, problem
 from workbench.fit.fit_result import Fit, Terms, fit_at, terms_of_all
 from workbench.fit.fit_thresholds import FIT, Effort
-from workbench.fit.likelihood import Likelihood
+from workbench.fit.likelihood import Likelihood, cost_of
 from workbench.fit.minimiser import End, begin_by_landings, derivatives, descend
 from workbench.fit.onsets import with_onsets
 from workbench.fit.starts import (
@@ -211,7 +211,7 @@ def glimpse(
             begins = starts_by_landings(like, added, fitted, Origin(sheet), points)
             searches += [lambda z=z: _from_afar(like, z, FIT.descent.glimpse, chosen) for z in begins]  # type: ignore[misc]
     ends = list(on_threads(lambda search: search(), searches, workers))
-    if like.cost(without.whole) < min((each.cost for each in ends), default=inf):  # an own effect may declare no start
+    if cost_of(without.whole) < min((each.cost for each in ends), default=inf):  # an own effect may declare no start
         ends.append(descend(like, off, base.onsets_s, FIT.descent.glimpse))
     best = _cheapest(ends)
     other_order = in_other_order(like, best.z)
@@ -265,7 +265,7 @@ def leave_off(of: Problem, trial: Trial) -> Fit:
     """Return the fit of a trial that is not gone on with, as far as it came."""
     like, best = trial.like, trial.valleys[0]
     groups = like.at(like.theta(best.z), best.onsets_s)
-    cost = like.cost(groups.whole)
+    cost = cost_of(groups.whole)
     end = best if best.cost < cost else replace(best, cost=cost, groups=groups, is_eased=like.is_eased)
     like = _law(like, end)
     return fit_at(of, like, replace(end, jacobian=derivatives(like, end.z, end.onsets_s)), agreement=0)

@@ -10,7 +10,6 @@ moves, a model is indifferent to its delay but within a sample of the right one:
 """
 
 from collections.abc import Sequence
-from typing import NamedTuple
 
 import numpy as np
 from scipy.optimize import minimize_scalar
@@ -31,9 +30,10 @@ def guessed_values(added: Sequence[Parameter], record: Record) -> list[tuple[flo
     suggested: list[dict[str, float]] = []
     ends = _ends(added, record)
     if ends is not None:
+        lowest_m, highest_m, below_m, above_m = ends
         for inside in (FIT.guesses.inside_noises**power * record.scale_m for power in range(3)):
-            lower_m, upper_m = ends.lowest_m + inside, ends.highest_m - inside
-            stops = ((ends.below_m, upper_m), (lower_m, ends.above_m), (lower_m, upper_m))
+            lower_m, upper_m = lowest_m + inside, highest_m - inside
+            stops = ((below_m, upper_m), (lower_m, above_m), (lower_m, upper_m))
             suggested += [{"lowest": lower, "swept": upper - lower} for lower, upper in stops]
     if any(each.guess == "quantum" for each in added):
         suggested += [{"quantum": each} for each in likely_quanta_m(record)]
@@ -45,17 +45,11 @@ def guessed_values(added: Sequence[Parameter], record: Record) -> list[tuple[flo
     ]
 
 
-class _Ends(NamedTuple):
-    """Of the positions, and where a stop that none comes to is declared, or farther out, m."""
+def _ends(added: Sequence[Parameter], record: Record) -> tuple[float, float, float, float] | None:
+    """Return the lowest and highest position, and where a stop below and above is that none comes to, m.
 
-    lowest_m: float
-    highest_m: float
-    below_m: float
-    above_m: float
-
-
-def _ends(added: Sequence[Parameter], record: Record) -> _Ends | None:
-    """Return them; None for effects without stops."""
+    None for effects without stops.
+    """
     declared = {each.guess: each.starts[0] for each in added if each.guess in ("lowest", "swept")}
     if declared.keys() != {"lowest", "swept"}:
         return None
@@ -63,7 +57,7 @@ def _ends(added: Sequence[Parameter], record: Record) -> _Ends | None:
     lowest_m, highest_m = np.quantile(record.position_m[record.valid], (quantile, 1.0 - quantile)).tolist()
     aside_m = FIT.guesses.aside_of_swept * (highest_m - lowest_m)
     below_m = min(declared["lowest"], lowest_m - aside_m)
-    return _Ends(lowest_m, highest_m, below_m, max(declared["lowest"] + declared["swept"], highest_m + aside_m))
+    return lowest_m, highest_m, below_m, max(declared["lowest"] + declared["swept"], highest_m + aside_m)
 
 
 def likely_delays_s(record: Record) -> list[float]:

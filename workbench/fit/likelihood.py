@@ -159,7 +159,10 @@ class Likelihood:
         self.composition, self.record, self.parameters = composition, record, tuple(parameters)
         self.by, self.from_pressure, self.load_n = by, from_pressure, load_n
         self.run = ToldRun(composition, record, tuple(told), by=by, from_pressure=from_pressure)
-        self.layout = layout(record, self.run.moves)
+        self.moves = self.run.moves
+        self.layout = layout(record, self.moves)
+        self.broken, self.move_of = self.layout.broken, self.layout.move_of
+        self.bounds = np.array([each.bounds for each in parameters]).reshape(-1, 2).T
         self.sigma_m = record.scale_m
         self.landing_m = self.sigma_m * np.sqrt(1.0 / self.layout.per_rest + FIT.weights.landing_noises**2)
         self.is_eased = eased
@@ -172,21 +175,6 @@ class Likelihood:
         eased = copy(self)
         eased.is_eased, eased._last = True, None
         return eased
-
-    @property
-    def moves(self) -> tuple[ToldMove, ...]:
-        """What the stem is told."""
-        return self.run.moves
-
-    @property
-    def broken(self) -> Rows:
-        """Which of these break loose from a rest."""
-        return self.layout.broken
-
-    @property
-    def move_of(self) -> Rows:
-        """As `Layout`."""
-        return self.layout.move_of
 
     @property
     def count(self) -> int:
@@ -231,10 +219,6 @@ class Likelihood:
         blocks = (sums / rows.count - mean[rows.rest_of]) * np.sqrt(rows.count)
         (broken,) = self.rows_of_static(path, theta[STATIC : STATIC + 1])
         return Groups(e[rows.moving], mean * self.sigma_m / self.landing_m, blocks, broken)
-
-    def cost(self, r: Vector) -> float:
-        """Return the soft-L1 cost of some residuals, (rows,)."""
-        return float(soft(r).sum())
 
     def wide_landings(self, groups: Groups) -> Vector:
         """Return the residuals of landings, wide, and of break-aways: what leads a search that begins far off."""
@@ -287,6 +271,11 @@ def soft(r: Vector) -> Vector:
     return np.asarray(scale**2 * (np.sqrt(1.0 + (r / scale) ** 2) - 1.0))
 
 
+def cost_of(r: Vector) -> float:
+    """Return the soft-L1 cost of residuals together."""
+    return float(soft(r).sum())
+
+
 def soft_weight(r: Vector) -> Vector:
     """Return W of each residual: W r is the slope of its soft-L1 cost."""
     return np.asarray(1.0 / np.sqrt(1.0 + (r / FIT.weights.soft_noises) ** 2))
@@ -296,7 +285,7 @@ def coupling(of: Rows, by_z: Vector, by_onset: Vector, weight: Vector, moves: in
     """Return C, (parameters, moves), and D, (moves,): curvature by a coordinate and an onset, and by an onset alone.
 
     Args:
-        of: as `Likelihood.move_of`, (rows,).
+        of: as `Layout.move_of`, (rows,).
         by_z: derivatives of the residuals, (rows, parameters).
         by_onset: the same by the onset of the move that each belongs to, (rows,).
         weight: of each residual's square, (rows,).
@@ -307,5 +296,5 @@ def coupling(of: Rows, by_z: Vector, by_onset: Vector, weight: Vector, moves: in
 
 
 def by_move(of: Rows, values: Vector, moves: int) -> Vector:
-    """Return sums over the rows that belong to each move, (moves,); `of` as `Likelihood.move_of`."""
+    """Return sums over the rows that belong to each move, (moves,); `of` as `Layout.move_of`."""
     return np.asarray(np.bincount(of, values, moves + 1)[:-1], dtype=np.float64)

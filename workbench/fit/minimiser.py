@@ -28,7 +28,7 @@ from sim.composition import COULOMB, SPRING, STATIC, VISCOUS
 from sim.karnopp import Vector
 from workbench.fit.breaking_off import go_on
 from workbench.fit.fit_thresholds import FIT, Effort
-from workbench.fit.likelihood import Groups, Likelihood, Rows, by_move, coupling, soft, soft_weight
+from workbench.fit.likelihood import Groups, Likelihood, Rows, by_move, cost_of, coupling, soft, soft_weight
 
 
 class Slopes(NamedTuple):
@@ -56,10 +56,6 @@ class Ground:
     """The move that each residual belongs to, (rows,); the number of moves: none."""
     low: Place
     high: Place
-
-    def cost(self, r: Vector) -> float:
-        """Return the soft-L1 cost of residuals."""
-        return float(soft(r).sum())
 
     def of_moves(self, values: Vector) -> Vector:
         """Return sums over the residuals of each move, (moves,)."""
@@ -95,11 +91,11 @@ def minimise(ground: Ground, begin: Place, effort: Effort) -> Place:
     here = Place(*(np.clip(at, low, high) for at, low, high in zip(begin, ground.low, ground.high, strict=True)))
     ground = replace(ground, rows=simulated)
     r = ground.rows(here)
-    cost, slopes, fresh, damping, idle = ground.cost(r), ground.slopes(here, r), True, FIT.damping.first, False
+    cost, slopes, fresh, damping, idle = cost_of(r), ground.slopes(here, r), True, FIT.damping.first, False
     while left > 0 and damping <= FIT.damping.most:
         step, lengths = _step(ground, here, r, slopes, damping)
         linear = r + slopes.by_z @ step.z + slopes.by_onset * ground.to_rows(step.o)
-        promised, free = cost - ground.cost(linear), damping <= FIT.damping.free
+        promised, free = cost - cost_of(linear), damping <= FIT.damping.free
         if promised <= 0.5 * enough * cost * (1.0 if free else FIT.damping.free):
             if fresh:
                 break
@@ -107,12 +103,12 @@ def minimise(ground: Ground, begin: Place, effort: Effort) -> Place:
             continue
         there = Place(here.z + step.z, here.o + step.o)
         r_there = ground.rows(there)
-        gained = cost - ground.cost(r_there)
+        gained = cost - cost_of(r_there)
         if gained <= FIT.damping.poor * promised and here.o.size:
             there, r_there = _with_onsets_that_help(ground, there, r_there, here.o)
             step = Place(step.z, there.o - here.o)
             linear = r + slopes.by_z @ step.z + slopes.by_onset * ground.to_rows(step.o)
-            gained = cost - ground.cost(r_there)
+            gained = cost - cost_of(r_there)
         kept, small = gained > FIT.damping.poor * promised, gained < enough * cost
         if gained <= 0.0:
             damping *= FIT.damping.failed
@@ -145,7 +141,7 @@ def _with_onsets_that_help(ground: Ground, there: Place, r: Vector, before: Vect
     worse = ground.of_moves(soft(left)) < ground.of_moves(soft(r))
     mixed = Place(there.z, np.where(worse, before, there.o))
     r_mixed = ground.rows(mixed)
-    return (mixed, r_mixed) if ground.cost(r_mixed) < ground.cost(r) else (there, r)
+    return (mixed, r_mixed) if cost_of(r_mixed) < cost_of(r) else (there, r)
 
 
 def _step(ground: Ground, here: Place, r: Vector, slopes: Slopes, damping: float) -> tuple[Place, Place]:
@@ -211,7 +207,7 @@ def begin_by_landings(like: Likelihood, z: Vector) -> Vector:
         STATIC: sheet.static_deviation,
     }
     prior = np.array([deviations.get(each.index, np.inf) for each in like.parameters])
-    low, high = _bounds(like)
+    low, high = like.bounds
     start, none = np.clip(z, low, high), np.empty(0)
 
     def rows(at: Place) -> Vector:
@@ -242,7 +238,7 @@ def descend(
     onsets_s = _seconds(like, found.o)
     groups = like.at(like.theta(found.z), onsets_s)
     jacobian = derivatives(like, found.z, onsets_s) if effort == FIT.descent.whole else np.empty((0, 0))
-    return End(found.z, onsets_s, like.cost(groups.whole), groups, jacobian, like.is_eased)
+    return End(found.z, onsets_s, cost_of(groups.whole), groups, jacobian, like.is_eased)
 
 
 def derivatives(like: Likelihood, z: Vector, onsets_s: Vector) -> Vector:
@@ -256,7 +252,7 @@ def derivatives(like: Likelihood, z: Vector, onsets_s: Vector) -> Vector:
 
 def _ground(like: Likelihood, held: tuple[Vector, Vector] | None = None) -> Ground:
     """Return the ground of a likelihood, its coordinates held as of `descend`."""
-    low, high = _bounds(like)
+    low, high = like.bounds
     earliest_s, latest_s = like.run.bounds_s(FIT.onsets.reach_periods)
 
     def rows(at: Place) -> Vector:
@@ -274,8 +270,3 @@ def _periods(like: Likelihood, onsets_s: Vector) -> Vector:
 
 def _seconds(like: Likelihood, o: Vector) -> Vector:
     return np.asarray(like.run.first_onsets_s() + like.run.period_s * o)
-
-
-def _bounds(like: Likelihood) -> tuple[Vector, Vector]:
-    ends = np.array([each.bounds for each in like.parameters]).reshape(-1, 2)
-    return ends[:, 0], ends[:, 1]

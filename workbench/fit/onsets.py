@@ -9,7 +9,7 @@ import numpy as np
 from sim.karnopp import Vector
 from workbench.fit.breaking_off import go_on
 from workbench.fit.fit_thresholds import FIT
-from workbench.fit.likelihood import Groups, Likelihood, by_move, soft, soft_weight
+from workbench.fit.likelihood import Groups, Likelihood, by_move, cost_of, soft, soft_weight
 
 
 def with_onsets(like: Likelihood, theta: Vector, rounds: int | None = None) -> tuple[Vector, Groups]:
@@ -50,7 +50,7 @@ def with_onsets(like: Likelihood, theta: Vector, rounds: int | None = None) -> t
         onsets_s = np.where(better, there_s, onsets_s)
         reach = np.where(better, reach, FIT.onsets.shorter * reach)
         before, groups = groups, like.at(theta, onsets_s)
-        gained = like.cost(before.whole) - like.cost(groups.whole)
+        gained = cost_of(before.whole) - cost_of(groups.whole)
         if number and gained < FIT.ends.onset_nats and reach.max() <= FIT.onsets.step_periods:
             break
     return onsets_s, groups

@@ -13,7 +13,7 @@ from sim.composition import COULOMB, SPRING, STATIC, VISCOUS
 from sim.karnopp import Vector
 from workbench.fit.fit_thresholds import FIT
 from workbench.fit.guesses import guessed_values
-from workbench.fit.likelihood import Groups, Likelihood, with_static
+from workbench.fit.likelihood import Groups, Likelihood, cost_of, with_static
 from workbench.model.search_coordinates import Parameter, strengths
 
 
@@ -80,7 +80,7 @@ def in_other_order(like: Likelihood, z: Vector) -> Vector | None:
 def _likeliest(like: Likelihood, thetas: Iterable[Vector], onsets_s: Vector) -> Vector:
     """Return the coordinates of the likeliest of parameter vectors, each with its own static friction."""
     found = [_at_its_static(like, theta, onsets_s) for theta in thetas]
-    costs = [like.cost(groups.whole) for _, groups in found]
+    costs = [cost_of(groups.whole) for _, groups in found]
     return like.coordinates(found[_first_of_least(costs)][0])
 
 
@@ -126,7 +126,7 @@ def _best_by_landings(
         onsets_s = like.run.first_onsets_s() if origin.onsets_s is None else origin.onsets_s
         for theta in _strewn(like, added, origin, points):
             thetas.append(theta)
-            costs.append(like.cost(like.wide_landings(like.at(theta, onsets_s))))
+            costs.append(cost_of(like.wide_landings(like.at(theta, onsets_s))))
     return like.coordinates(thetas[_first_of_least(costs)] if thetas else origins[0].theta)
 
 

@@ -265,15 +265,16 @@ def _static_interval(like: Likelihood, end: End, i: int, about: Curvature) -> tu
     low, high, early = _by_break_aways(like, theta, path, i, wider)
     others = np.delete(np.arange(end.z.size), i)
     values, vectors = principal_axes(about.covariance[np.ix_(others, others)])
-    bounds, below, above = np.array([each.bounds for each in like.parameters]), 0.0, 0.0
+    below = above = 0.0
     for way in (FIT.intervals.deviations * np.sqrt(np.maximum(values, 0.0)) * vectors).T:
         found = []
         for step in (-way, way):
-            there = like.theta(np.clip(end.z + np.insert(step, i, 0.0), *bounds.T))
+            there = like.theta(np.clip(end.z + np.insert(step, i, 0.0), *like.bounds))
             found.append(_by_break_aways(like, there, like.run.run(there, end.onsets_s), i, wider))
         below += max(0.0, *(low - lowest for lowest, _, _ in found)) ** 2
         above += max(0.0, *(highest - high for _, highest, _ in found)) ** 2
-    return max(low - below**0.5, float(bounds[i, 0])), min(high + above**0.5, float(bounds[i, 1])), early
+    least, most = like.parameters[i].bounds
+    return max(low - below**0.5, least), min(high + above**0.5, most), early
 
 
 def _by_break_aways(

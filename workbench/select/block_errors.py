@@ -28,7 +28,7 @@ from workbench.data.held_out import HELD_OUT_RECORDING, Part, Split, residual_m
 from workbench.fit.fit_result import Counted, Fit, Terms, terms
 from workbench.fit.fit_thresholds import FIT
 from workbench.fit.fitting import at_the_noise, problem_of
-from workbench.fit.likelihood import Groups, Likelihood
+from workbench.fit.likelihood import Groups, Likelihood, cost_of
 from workbench.fit.minimiser import descend
 from workbench.fit.onsets import with_onsets
 from workbench.model.simulation_regime import NO_LANDING
@@ -140,7 +140,7 @@ def _on_held_out(fit: Fit, part: Part) -> _Told:
     onsets_s, groups = with_onsets(like, theta)
     z, root = like.coordinates(theta), fit.known.root
     fits = at_the_noise(fit.cost, fit.count)
-    if not (fits and z.size) or at_the_noise(like.cost(groups.whole), like.count):
+    if not (fits and z.size) or at_the_noise(cost_of(groups.whole), like.count):
         return _at(like, part, theta, onsets_s, np.zeros(z.size))
     if others := _open(fit, like, z):
         begin = min([z, *others], key=lambda at: _cost(like, at, root @ (at - z)))
@@ -175,7 +175,7 @@ def _open(fit: Fit, like: Likelihood, z: Column) -> list[Column]:
 def _cost(like: Likelihood, z: Column, moved: Column) -> float:
     """Return the cost at coordinates, and of how far these are from a fit's, in deviations."""
     _, groups = with_onsets(like, like.theta(z), FIT.onsets.coarse_rounds)
-    return like.cost(np.concatenate([groups.whole, moved]))
+    return cost_of(np.concatenate([groups.whole, moved]))
 
 
 def _likelihood(fit: Fit, part: Part) -> tuple[Likelihood, Vector]:
