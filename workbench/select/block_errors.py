@@ -14,6 +14,7 @@ fitted. Errors in metres are of the same runs.
 """
 
 from dataclasses import dataclass
+from itertools import compress
 from typing import NamedTuple
 
 import numpy as np
@@ -98,33 +99,76 @@ def block_errors(fit: Fit, split: Split) -> BlockErrors:
     Raises:
         InputError: nothing that was held out is judged: no slide is seen to land in it.
     """
-    train, test = split.train, split.test
-    fitted, held_out = _on_fitted(fit, train), _on_held_out(fit, test)
+    fitted, held_out = _on_fitted(fit, split.train), _on_held_out(fit, split.test)
     if not np.isfinite(held_out.error_m).any():
         raise InputError(HELD_OUT_RECORDING, NO_LANDING)
     negligible_m = SELECTION.negligible_error * split.scale_m
     return BlockErrors(
         train_rmse_m=_rms(fitted.error_m),
         test_rmse_m=_rms(held_out.error_m),
-        train_block_m=float(np.median(_event_errors_m(fitted.like, fitted.error_m, train))),
-        test_block_m=float(np.median(_event_errors_m(held_out.like, held_out.error_m, test))),
-        logs=_logs(held_out.like, held_out.groups, test),
-        structure=max(
-            structure(part.record, told.error_m, negligible_m) for part, told in ((train, fitted), (test, held_out))
-        ),
-        held_out=terms(_of_counted(held_out.like, held_out.groups, test), held_out.moved),
+        train_block_m=float(np.median(fitted.event_errors_m)),
+        test_block_m=float(np.median(held_out.event_errors_m)),
+        logs=held_out.logs,
+        structure=max(structure(each.part.record, each.error_m, negligible_m) for each in (fitted, held_out)),
+        held_out=terms(held_out.of_counted, held_out.moved),
     )
 
 
 class _Told(NamedTuple):
     """A fit told through a part."""
 
+    part: Part
     like: Likelihood
     groups: Groups
     error_m: Column
     """(n,)."""
     moved: Vector
     """How far its parameters had to go, in deviations, (parameters,)."""
+
+    @property
+    def counted(self) -> list[bool]:
+        """Whether each move counts: of a recording whose end is held out those of the end."""
+        return [bool(self.part.counted[each.after]) for each in self.like.moves]
+
+    @property
+    def event_errors_m(self) -> Column:
+        """The rms error of each event that counts, m; of a part without any, of all of it."""
+        rows = [self.error_m[each.before : each.until + 1] for each in compress(self.like.moves, self.counted)]
+        return np.array([_rms(each) for each in rows if np.isfinite(each).any()] or [_rms(self.error_m)])
+
+    @property
+    def logs(self) -> Column:
+        """l_k of the events and of the break-aways that count."""
+        like, groups, counted, found = self.like, self.groups, self.counted, []
+        blocks = np.bincount(like.layout.rest_of, groups.rests**2, like.layout.per_rest.size)
+        per_rest = np.maximum(np.bincount(like.layout.rest_of, minlength=like.layout.per_rest.size), 1)
+        for k, (first, end) in enumerate(like.layout.in_motion):
+            if not counted[k]:
+                continue
+            squares = [float(np.mean(groups.motion[first:end] ** 2))] if end > first else []
+            rest = like.layout.rest_after[k]
+            if rest >= 0:
+                squares += [float(groups.landings[rest] ** 2), float(blocks[rest] / per_rest[rest])]
+            found.append(0.5 * np.log1p(np.mean(squares)) if squares else 0.0)
+        broken = [0.5 * np.log1p(z**2) for k, z in zip(like.broken, groups.break_aways, strict=True) if counted[k]]
+        return np.array([*found, *broken])
+
+    @property
+    def of_counted(self) -> Counted:
+        """The residuals of the moves that count, and of the rests they end in."""
+        like, groups, counted = self.like, self.groups, self.counted
+        if all(counted):
+            return Counted(groups, like.layout.rest_of, len(counted))
+        moves = [k for k, counts in enumerate(counted) if counts]
+        rests = [like.layout.rest_after[k] for k in moves if like.layout.rest_after[k] >= 0]
+        rows, blocks = like.layout.in_motion, np.isin(like.layout.rest_of, rests)
+        found = Groups(
+            np.concatenate([np.empty(0), *(groups.motion[slice(*rows[k])] for k in moves)]),
+            groups.landings[rests],
+            groups.rests[blocks],
+            groups.break_aways[np.isin(like.broken, moves)],
+        )
+        return Counted(found, like.layout.rest_of[blocks], len(moves))
 
 
 def _on_fitted(fit: Fit, part: Part) -> _Told:
@@ -186,65 +230,17 @@ def _likelihood(fit: Fit, part: Part) -> tuple[Likelihood, Vector]:
 def _at(like: Likelihood, part: Part, theta: Vector, onsets_s: Vector, moved: Vector) -> _Told:
     path = like.path(theta, onsets_s)
     off_m = like.off_m(path, theta)
-    return _Told(like, like.of_path(path, theta), residual_m(part, part.record.position_m + off_m), moved)
-
-
-def _counted(like: Likelihood, part: Part) -> list[bool]:
-    """Return of each move whether it counts: of a recording whose end is held out those of the end."""
-    return [bool(part.counted[each.after]) for each in like.moves]
-
-
-def _of_counted(like: Likelihood, groups: Groups, part: Part) -> Counted:
-    """Return the residuals of the moves that count, and of the rests they end in."""
-    counted = _counted(like, part)
-    if all(counted):
-        return Counted(groups, like.layout.rest_of, len(counted))
-    moves = [k for k, counts in enumerate(counted) if counts]
-    rests = [like.layout.rest_after[k] for k in moves if like.layout.rest_after[k] >= 0]
-    rows, blocks = like.layout.in_motion, np.isin(like.layout.rest_of, rests)
-    found = Groups(
-        np.concatenate([np.empty(0), *(groups.motion[slice(*rows[k])] for k in moves)]),
-        groups.landings[rests],
-        groups.rests[blocks],
-        groups.break_aways[np.isin(like.broken, moves)],
-    )
-    return Counted(found, like.layout.rest_of[blocks], len(moves))
+    return _Told(part, like, like.of_path(path, theta), residual_m(part, part.record.position_m + off_m), moved)
 
 
 def event_logs(fit: Fit, part: Part) -> Column:
     """Return l_k of a fit's events and break-aways in a part, (events,)."""
-    told = _on_held_out(fit, part)
-    return _logs(told.like, told.groups, part)
+    return _on_held_out(fit, part).logs
 
 
 def event_errors_m(fit: Fit, part: Part) -> Column:
     """Return the rms error of each event of a part that counts, m; of a part without any, of all of it."""
-    told = _on_held_out(fit, part)
-    return _event_errors_m(told.like, told.error_m, part)
-
-
-def _logs(like: Likelihood, groups: Groups, part: Part) -> Column:
-    """Return l_k of the events and of the break-aways that count."""
-    counted, found = _counted(like, part), []
-    blocks = np.bincount(like.layout.rest_of, groups.rests**2, like.layout.per_rest.size)
-    per_rest = np.maximum(np.bincount(like.layout.rest_of, minlength=like.layout.per_rest.size), 1)
-    for k, (first, end) in enumerate(like.layout.in_motion):
-        if not counted[k]:
-            continue
-        squares = [float(np.mean(groups.motion[first:end] ** 2))] if end > first else []
-        rest = like.layout.rest_after[k]
-        if rest >= 0:
-            squares += [float(groups.landings[rest] ** 2), float(blocks[rest] / per_rest[rest])]
-        found.append(0.5 * np.log1p(np.mean(squares)) if squares else 0.0)
-    broken = [0.5 * np.log1p(z**2) for k, z in zip(like.broken, groups.break_aways, strict=True) if counted[k]]
-    return np.array([*found, *broken])
-
-
-def _event_errors_m(like: Likelihood, error_m: Column, part: Part) -> Column:
-    """Return the rms error of each event that counts, m; of a part without any, of all of it."""
-    counted = _counted(like, part)
-    rows = [error_m[each.before : each.until + 1] for k, each in enumerate(like.moves) if counted[k]]
-    return np.array([_rms(each) for each in rows if np.isfinite(each).any()] or [_rms(error_m)])
+    return _on_held_out(fit, part).event_errors_m
 
 
 def _rms(error_m: Column) -> float:

@@ -30,7 +30,6 @@ from workbench.fit.threads import on_threads
 from workbench.select.block_errors import block_errors
 from workbench.select.effect_acceptance import evidence_for, promise
 from workbench.select.effect_candidates import (
-    EffectCandidate,
     EffectStep,
     EvaluatedModel,
     indistinguishable,
@@ -330,7 +329,9 @@ class EffectSearch:
         if added is None or all(each.added is None for each in later) or not last.explained:
             return step
         own = algebraic_class(added.name, self._library)
-        asked = [each.name for each in step.candidates if _may_stand(each) and each.name not in own | {*last.effects}]
+        # What has evidence alone may do better beside others.
+        evident = [each.name for each in step.candidates if each.physical and each.evidence > SELECTION.least_evidence]
+        asked = [name for name in evident if name not in own | {*last.effects}]
         if not asked:
             return step
         valve = last.fit.valve
@@ -369,8 +370,3 @@ def _one_of_each(found: Sequence[_Round]) -> list[_Round]:
 def model_after(step: EffectStep) -> EvaluatedModel:
     """Return what a step has come to."""
     return step.added.model if step.added and step.added.model else step.before
-
-
-def _may_stand(candidate: EffectCandidate) -> bool:
-    """Whether an effect that was tried may be what is missing, better beside others than alone."""
-    return candidate.model is not None and candidate.physical and candidate.evidence > SELECTION.least_evidence

@@ -18,6 +18,7 @@ so.
 
 from collections.abc import Iterable, Mapping
 from dataclasses import dataclass
+from typing import ClassVar
 
 import numpy as np
 
@@ -42,14 +43,14 @@ TAKEN_UP = 2
 
 @dataclass(frozen=True, slots=True)
 class Undetectable:
-    """An effect that the recordings do not show up to a strength, and the parameters that stand in for it."""
+    """A play that the recordings do not show up to a width, and the parameters that stand in for it."""
 
-    name: str
-    like: tuple[str, ...]
     most_m: float
     length: Scale
     """As it is read."""
-    shown_by: str
+    name: ClassVar = BACKLASH
+    like: ClassVar = ("coulomb_n", "static_n")
+    shown_by: ClassVar = "slow restarts in the same direction after a hold"
 
     @property
     def sentence(self) -> str:
@@ -75,10 +76,7 @@ def undetectable(split: Split, valve: ValveFile) -> tuple[Undetectable, ...]:
         if any(_apart_m(each, valve, twin) > shown_m for each in (split.train, split.test)):
             break
         most_m = width_m
-    if not most_m:
-        return ()
-    like, shown_by = ("coulomb_n", "static_n"), "slow restarts in the same direction after a hold"
-    return (Undetectable(BACKLASH, like, most_m, valve.valve.own.length, shown_by),)
+    return (Undetectable(most_m, valve.valve.own.length),) if most_m else ()
 
 
 def with_backlash(file: ValveFile, width_m: float) -> ValveFile:
