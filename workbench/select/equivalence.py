@@ -37,8 +37,6 @@ BACKLASH = "backlash"
 
 STROKE_SHARES = (0.0, 0.1373, 0.3819, 0.6181, 0.8771)
 """Of the stroke: none is a multiple of another, as those of a quantum are."""
-TAKEN_UP = 2
-"""Slips after which the play has been taken up from either side, wherever the linkage stood at the start."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -94,8 +92,8 @@ def _apart_m(part: Part, one: ValveFile, other: ValveFile) -> float:
     begun = np.zeros(len(record), np.bool_)
     for first, end in record.segments:
         found = slips(np.where(record.valid, record.position_m, np.nan)[first:end], record.scale_m)
-        if len(found) > TAKEN_UP:
-            begun[first + found[TAKEN_UP].first : end] = True
+        if len(found) > SELECTION.slips_before:
+            begun[first + found[SELECTION.slips_before].first : end] = True
     rows = part.counted & begun
     if not rows.any():
         return np.inf

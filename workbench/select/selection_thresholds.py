@@ -97,6 +97,8 @@ class SelectionThresholds:
     """Noises: a play that narrow is not worth saying."""
     plays_tried: int = 16
     """From the least to the widest that friction can stand in for, each by the same factor wider."""
+    slips_before: int = 2
+    """After them the play has been taken up from either side, wherever the linkage stood at the start."""
     same_length: float = 1e-12
     """Of the stroke: as far as lengths come out different by the arithmetic alone."""
 
