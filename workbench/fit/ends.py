@@ -70,10 +70,9 @@ def _cheapest(
 ) -> tuple[Vector, Vector]:
     """Return the coordinates and onsets, s, of the cheapest of some places drawn about an end."""
     normal = generator.standard_normal((FIT.ends.draws, end.z.size))
-    steps = np.clip(
-        FIT.ends.spread_deviations * np.linalg.lstsq(root, normal.T)[0].T, -FIT.damping.longest, FIT.damping.longest
-    )
-    places = np.clip(end.z + steps, *like.bounds)
+    longest = FIT.damping.longest_step
+    steps = FIT.ends.spread_deviations * np.linalg.lstsq(root, normal.T)[0].T
+    places = np.clip(end.z + np.clip(steps, -longest, longest), *like.bounds)
     earliest_s, latest_s = like.run.bounds_s(FIT.onsets.reach_periods)
     onsets_s = [
         np.clip(end.onsets_s + like.run.period_s * np.clip(follow @ (z - end.z), -1.0, 1.0), earliest_s, latest_s)

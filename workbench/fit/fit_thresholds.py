@@ -43,10 +43,10 @@ class Weights:
 class Sheet:
     """How far a valve may be off its data sheet."""
 
-    factor: float = 2.0
+    off_factor: float = 2.0
     """Of friction, up and down, where the data sheet's leads to no end at the noise; of damping, from which on the data
     sheet's and a fit's are two: what an engineer may be off by."""
-    less_damping: tuple[float, ...] = (0.7, 0.5, 0.35, 0.25)
+    less_damping_factors: tuple[float, ...] = (0.7, 0.5, 0.35, 0.25)
     """Factors from which searches begin where a stem may swing past its balance."""
     spring_deviation: float = 0.15
     """Of a logarithm, as the next: a weak prior while landings lead."""
@@ -103,7 +103,7 @@ class Onsets:
     """Of parabolas: the bottom takes two, a step that is taken back two more."""
     coarse_rounds: int = 2
     """The same before a coarse search: it moves onsets itself."""
-    shorter: float = 0.3
+    shorter_factor: float = 0.3
     """Factor on the step where it led higher."""
     shift_periods: float = 0.1
     """For derivatives."""
@@ -113,31 +113,31 @@ class Onsets:
 class Damping:
     """How lambda follows the steps, as usual (Nocedal and Wright, Numerical Optimization, 4.1 and 10.3)."""
 
-    least: float = 1e-4
-    most: float = 100.0
+    least_lambda: float = 1e-4
+    most_lambda: float = 100.0
     """Where no step so short leads lower, none does: what is left is the arithmetic's."""
-    poor: float = 0.25
+    poor_share: float = 0.25
     """Share of what a step promised, below which lambda grows, and J is taken anew."""
-    down: float = 0.2
-    up: float = 2.0
-    failed: float = 10.0
-    """Factors on lambda: after a good step, a poor one, and one that led higher."""
-    free: float = 0.1
+    good_factor: float = 0.2
+    poor_factor: float = 2.0
+    failed_factor: float = 10.0
+    """On lambda: after a good step, a poor one, and one that led higher."""
+    free_lambda: float = 0.1
     """Lambda up to which a small step is small by itself and not by lambda."""
-    longest: float = 0.3
+    longest_step: float = 0.3
     """Of a coordinate, a logarithm mostly, in a step without damping: one that hardly matters is not thrown about."""
-    part: float = 0.8
+    share_to_bound: float = 0.8
     """Of the way to a bound that one step takes at most: a coordinate that a first step throws there is lost."""
 
     @property
-    def first(self) -> float:
-        """Lambda at the beginning: the first failure's."""
-        return self.failed * self.least
+    def first_lambda(self) -> float:
+        """Lambda at the beginning: a failure above the least."""
+        return self.failed_factor * self.least_lambda
 
     @property
-    def good(self) -> float:
+    def good_share(self) -> float:
         """Share of what a step promised, from which on lambda falls: it lacks no more than a poor one gains."""
-        return 1.0 - self.poor
+        return 1.0 - self.poor_share
 
 
 @dataclass(frozen=True, slots=True)
@@ -213,11 +213,11 @@ class Intervals:
     earliest_deviations: float = 2.0
     """By which what breaks a stem loose is above its mean: of six independent values the largest is 2.0 of its own
     above theirs (of two 0.7, of twenty 3.6). A stem that is slowly loaded is broken loose by the largest."""
-    farthest: float = 8.0
+    farthest_deviation: float = 8.0
     """Deviation of a coordinate, a logarithm mostly, of which a record says nothing."""
-    undetermined: float = 1.0
+    undetermined_deviation: float = 1.0
     """Deviation of a logarithm, a factor of e, from which on the curvature does not determine it."""
-    involved: float = 0.3
+    involved_component: float = 0.3
     """Component of a unit vector from which a parameter is named as part of a combination."""
     static_values: int = 13
     """Of static friction tried in its interval: a free run is the same between the break-aways that each brings."""
@@ -227,14 +227,14 @@ class Intervals:
     """From the end of a range to where the cost would be least: the record wants the parameter beyond it."""
 
     @property
-    def upper(self) -> float:
+    def upper_probability(self) -> float:
         """Probability of what is below the upper end."""
         return 0.5 + 0.5 * self.probability
 
     @property
     def deviations(self) -> float:
         """Half of a normal quantity's interval, as tables have it."""
-        return round(float(ndtri(self.upper)), 2)
+        return round(float(ndtri(self.upper_probability)), 2)
 
     @property
     def rise_nats(self) -> float:

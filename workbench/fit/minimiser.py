@@ -91,12 +91,12 @@ def minimise(ground: Ground, begin: Place, effort: Effort) -> Place:
     here = Place(*(np.clip(at, low, high) for at, low, high in zip(begin, ground.low, ground.high, strict=True)))
     ground = replace(ground, rows=simulated)
     r = ground.rows(here)
-    cost, slopes, fresh, damping, idle = cost_of(r), ground.slopes(here, r), True, FIT.damping.first, False
-    while left > 0 and damping <= FIT.damping.most:
+    cost, slopes, fresh, damping, idle = cost_of(r), ground.slopes(here, r), True, FIT.damping.first_lambda, False
+    while left > 0 and damping <= FIT.damping.most_lambda:
         step, lengths = _step(ground, here, r, slopes, damping)
         linear = r + slopes.by_z @ step.z + slopes.by_onset * ground.to_rows(step.o)
-        promised, free = cost - cost_of(linear), damping <= FIT.damping.free
-        if promised <= 0.5 * enough * cost * (1.0 if free else FIT.damping.free):
+        promised, free = cost - cost_of(linear), damping <= FIT.damping.free_lambda
+        if promised <= 0.5 * enough * cost * (1.0 if free else FIT.damping.free_lambda):
             if fresh:
                 break
             slopes, fresh = ground.slopes(here, r, _width(damping)), True
@@ -104,23 +104,24 @@ def minimise(ground: Ground, begin: Place, effort: Effort) -> Place:
         there = Place(here.z + step.z, here.o + step.o)
         r_there = ground.rows(there)
         gained = cost - cost_of(r_there)
-        if gained <= FIT.damping.poor * promised and here.o.size:
+        if gained <= FIT.damping.poor_share * promised and here.o.size:
             there, r_there = _with_onsets_that_help(ground, there, r_there, here.o)
             step = Place(step.z, there.o - here.o)
             linear = r + slopes.by_z @ step.z + slopes.by_onset * ground.to_rows(step.o)
             gained = cost - cost_of(r_there)
-        kept, small = gained > FIT.damping.poor * promised, gained < enough * cost
+        kept, small = gained > FIT.damping.poor_share * promised, gained < enough * cost
         if gained <= 0.0:
-            damping *= FIT.damping.failed
-            if not fresh or damping / FIT.damping.failed <= FIT.damping.free < damping:
+            damping *= FIT.damping.failed_factor
+            if not fresh or damping / FIT.damping.failed_factor <= FIT.damping.free_lambda < damping:
                 slopes, fresh = ground.slopes(here, r, _width(damping)), True
             continue
         slopes = _seen(ground, slopes, r_there - linear, step, lengths)
         here, r, cost = there, r_there, cost - gained
         if fresh and small and (idle or (free and kept)):
             break
-        good = gained > FIT.damping.good * promised
-        damping = max(damping * (FIT.damping.down if good else 1.0 if kept else FIT.damping.up), FIT.damping.least)
+        good = gained > FIT.damping.good_share * promised
+        factor = FIT.damping.good_factor if good else 1.0 if kept else FIT.damping.poor_factor
+        damping = max(factor * damping, FIT.damping.least_lambda)
         idle, fresh = small, small or not kept
         if fresh:
             slopes = ground.slopes(here, r, _width(damping))
@@ -129,7 +130,7 @@ def minimise(ground: Ground, begin: Place, effort: Effort) -> Place:
 
 def _width(damping: float) -> float:
     """Return the step of a coordinate for its derivatives: wide where no step over narrow slopes led lower."""
-    return FIT.descent.wide_step if damping > FIT.damping.free else FIT.descent.step
+    return FIT.descent.wide_step if damping > FIT.damping.free_lambda else FIT.descent.step
 
 
 def _with_onsets_that_help(ground: Ground, there: Place, r: Vector, before: Vector) -> tuple[Place, Vector]:
@@ -158,9 +159,9 @@ def _step(ground: Ground, here: Place, r: Vector, slopes: Slopes, damping: float
     S = A + np.diag((damping + FIT.nothing) * diagonal) - (C / damped) @ C.T
     wanted = (C / damped) @ g_o - g_z
     free = ~(((here.z <= ground.low.z) & (g_z > 0.0)) | ((here.z >= ground.high.z) & (g_z < 0.0)) | (diagonal <= 0.0))
-    longest = FIT.damping.longest / (1.0 + 10.0 * damping)
-    low = np.maximum(FIT.damping.part * (ground.low.z - here.z), -longest)
-    high = np.minimum(FIT.damping.part * (ground.high.z - here.z), longest)
+    longest = FIT.damping.longest_step / (1.0 + 10.0 * damping)
+    low = np.maximum(FIT.damping.share_to_bound * (ground.low.z - here.z), -longest)
+    high = np.minimum(FIT.damping.share_to_bound * (ground.high.z - here.z), longest)
     z = np.zeros(here.z.size)
     while free.any():
         z[free] = np.linalg.lstsq(S[np.ix_(free, free)], wanted[free] - S[np.ix_(free, ~free)] @ z[~free])[0]

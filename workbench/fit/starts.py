@@ -27,13 +27,13 @@ class Origin:
 
 def base_starts(like: Likelihood) -> list[Vector]:
     """Return coordinates of the data sheet, then with more and with less friction."""
-    factors = (1.0, 1.0 / FIT.sheet.factor, FIT.sheet.factor)
+    factors = (1.0, 1.0 / FIT.sheet.off_factor, FIT.sheet.off_factor)
     return [_times(like, factor, COULOMB, STATIC) for factor in factors]
 
 
 def swinging_starts(like: Likelihood) -> list[Vector]:
     """Return coordinates of the data sheet with less damping."""
-    return [_times(like, factor, VISCOUS) for factor in FIT.sheet.less_damping]
+    return [_times(like, factor, VISCOUS) for factor in FIT.sheet.less_damping_factors]
 
 
 def _times(like: Likelihood, factor: float, *rows: int) -> Vector:
@@ -114,7 +114,7 @@ def starts_by_landings(
         points: values of the parameters in place of those that the effects declare.
     """
     apart = abs(np.log(max(fitted.theta[VISCOUS], FIT.nothing) / max(sheet.theta[VISCOUS], FIT.nothing)))
-    origins = ((fitted,), (sheet,)) if apart > np.log(FIT.sheet.factor) else ((fitted, sheet),)
+    origins = ((fitted,), (sheet,)) if apart > np.log(FIT.sheet.off_factor) else ((fitted, sheet),)
     return [_best_by_landings(like, added, each, points) for each in origins]
 
 

@@ -1,8 +1,8 @@
 """How well a recording determines what was fitted, by the curvature of its likelihood.
 
     H = J' W^3 J + 1 / f^2   J the residuals by coordinates z and onsets, W = 1 / sqrt(1 + (r / s)^2): the
-                             soft L1 has the slope W r and the curvature W^3; f = `farthest`, the deviation of what
-                             no residual hangs on
+                             soft L1 has the slope W r and the curvature W^3; f = `farthest_deviation`, of what no
+                             residual hangs on
     C = H^-1, but no less in any coordinate than (n - 1) / n sum_k d_k^2, and of an interval (n - 1) / n sum_k e_k^2 / b
     d_k = (A - A_k)^-1 g_k   by how much the coordinates move without the k-th of n moves and the rest that it ends in;
                              A = sum_k A_k curvature by coordinates, onsets eliminated, g_k = J_k' W_k r_k
@@ -110,28 +110,23 @@ def _curvature(like: Likelihood, end: End) -> Curvature:
     weight = soft_weight(r)
     J = end.jacobian
     lengths = np.linalg.norm(J, axis=0)
-    scale = np.hypot(lengths, 1.0 / FIT.intervals.farthest)
+    scale = np.hypot(lengths, 1.0 / FIT.intervals.farthest_deviation)
     scaled = J / scale
-    H = scaled.T @ (weight[:, None] ** 3 * scaled) + np.diag((FIT.intervals.farthest * scale) ** -2.0)
+    prior = (FIT.intervals.farthest_deviation * scale) ** -2.0
+    H = scaled.T @ (weight[:, None] ** 3 * scaled) + np.diag(prior)
     values, vectors = principal_axes(H)
     values = np.maximum(values, FIT.nothing * values[-1])
     inverse = (vectors / values) @ vectors.T
-    without, free = _without_each_move(like, scaled, weight, r, count, (FIT.intervals.farthest * scale[:count]) ** -2.0)
+    without, free = _without_each_move(like, scaled, weight, r, count, prior[:count])
     own, apart, together = (
         np.diag(inverse)[:count],
         _variance(without, 1),
         _variance(without, FIT.intervals.moves_together),
     )
-    std = np.minimum(np.sqrt(np.maximum(own, apart)) / scale[:count], FIT.intervals.farthest)
-    reach = (
-        np.where(
-            apart > own,
-            stdtrit(np.maximum(free, FIT.intervals.fewest_free), FIT.intervals.upper),
-            FIT.intervals.deviations,
-        )
-        * std
-    )
     alone = np.maximum(own, apart)
+    std = np.minimum(np.sqrt(alone) / scale[:count], FIT.intervals.farthest_deviation)
+    of_student = stdtrit(np.maximum(free, FIT.intervals.fewest_free), FIT.intervals.upper_probability)
+    reach = np.where(apart > own, of_student, FIT.intervals.deviations) * std
     shared = np.sqrt(np.maximum(together, alone) / alone)
     reach[lengths[:count] == 0.0] = np.inf
     off = -(inverse @ (scaled.T @ (weight * r)) / scale)[:count] / std
@@ -219,7 +214,8 @@ def uncertainty(like: Likelihood, end: End) -> Uncertainty:
         share = np.sqrt(1.0 - (other.cost - end.cost) / FIT.intervals.rise_nats)
         lower = np.minimum(lower, other.z - share * (other.z - there.lower))
         upper = np.maximum(upper, other.z + share * (there.upper - other.z))
-    std = np.maximum(about.std, np.minimum((upper - lower) / (2.0 * FIT.intervals.deviations), FIT.intervals.farthest))
+    widest = (upper - lower) / (2.0 * FIT.intervals.deviations)
+    std = np.maximum(about.std, np.minimum(widest, FIT.intervals.farthest_deviation))
     open_ones = _open_combinations(like, about.information[:count, :count])
     root = _root(about.covariance[:count, :count], std)
     farther = replace(own, lower=lower, upper=upper).of_truth(end.z)
@@ -235,7 +231,7 @@ def _about(like: Likelihood, end: End) -> tuple[Curvature, Interval]:
         if each.index == STATIC:
             low, high, early[i] = _static_interval(like, end, i, about)
             high = min(high + early[i], each.bounds[1])
-            std[i] = max(std[i] if std[i] < FIT.intervals.undetermined else 0.0, 0.25 * (high - low))
+            std[i] = max(std[i] if std[i] < FIT.intervals.undetermined_deviation else 0.0, 0.25 * (high - low))
             by_curvature = FIT.intervals.deviations * std[i]
             lower[i], upper[i], shared[i] = min(low, end.z[i] - by_curvature), max(high, end.z[i] + by_curvature), 1.0
     return replace(about, std=std), Interval(lower=lower, upper=upper, shared=shared, early=early)
@@ -261,7 +257,7 @@ def _static_interval(like: Likelihood, end: End, i: int, about: Curvature) -> tu
     )
     gains = np.nan_to_num((later.breaks_n - path.breaks_n) / FIT.onsets.shift_periods / like.load_n)
     by_onset = np.diag(about.information)[end.z.size :]
-    wider = np.hypot(1.0, gains / np.sqrt(np.maximum(by_onset, FIT.intervals.farthest**-2.0)))[like.broken]
+    wider = np.hypot(1.0, gains / np.sqrt(np.maximum(by_onset, FIT.intervals.farthest_deviation**-2.0)))[like.broken]
     low, high, early = _by_break_aways(like, theta, path, i, wider)
     others = np.delete(np.arange(end.z.size), i)
     values, vectors = principal_axes(about.covariance[np.ix_(others, others)])
@@ -302,10 +298,10 @@ def _open_combinations(like: Likelihood, H: Vector) -> tuple[Combination, ...]:
     values, vectors = principal_axes(H[np.ix_(rows, rows)])
     found = []
     for value, vector in zip(values, vectors.T, strict=True):
-        if value > FIT.intervals.undetermined**-2:
+        if value > FIT.intervals.undetermined_deviation**-2:
             continue
         order = np.argsort(-np.abs(vector))
-        involved = [i for i in order if abs(vector[i]) > FIT.intervals.involved]
+        involved = [i for i in order if abs(vector[i]) > FIT.intervals.involved_component]
         names = tuple(like.parameters[rows[i]].name for i in involved)
         found.append(Combination(names, tuple(float(vector[i] / vector[involved[0]]) for i in involved)))
     return tuple(found)

@@ -202,7 +202,7 @@ def _open(fit: Fit, like: Likelihood, z: Column) -> list[Column]:
     """Return other coordinates, along each that a fit leaves open; along static friction, of which it knows a range."""
     deviation, found = fit.known.deviations, []
     for i, each in enumerate(like.parameters):
-        farthest = min(SELECTION.same_standard_errors * deviation[i], FIT.intervals.farthest)
+        farthest = min(SELECTION.same_standard_errors * deviation[i], FIT.intervals.farthest_deviation)
         if each.index == STATIC:
             ahead = farthest * np.arange(1, SELECTION.places_tried + 1) / SELECTION.places_tried
         elif deviation[i] > SELECTION.left_open:
