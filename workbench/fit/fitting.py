@@ -32,7 +32,7 @@ from workbench.fit.starts import (
     in_other_order,
     near_start,
     starts_by_landings,
-    strewn_starts,
+    strewn,
     swinging_starts,
     with_strengths,
 )
@@ -201,7 +201,7 @@ def glimpse(
     without = like.at(like.theta(off), base.onsets_s)
     searches: list[Callable[[], End]] = []
     if like.run.hidden:  # friction stands in for a play where slides land: landings do not choose its width
-        begins = strewn_starts(like, added, fitted, points)
+        begins = [like.coordinates(theta) for theta in strewn(like, added, fitted, points)]
         searches += [lambda z=z: _from_afar(like, z, FIT.descent.glimpse) for z in begins]  # type: ignore[misc]
     else:
         near = near_start(like, added, fitted, points)

@@ -47,7 +47,7 @@ def near_start(
 ) -> Vector:
     """Return coordinates beside a fit, with the strengths of the effects that suit it best."""
     onsets_s = like.run.first_onsets_s() if fitted.onsets_s is None else fitted.onsets_s
-    return _likeliest(like, _strewn(like, added, fitted, points), onsets_s)
+    return _likeliest(like, strewn(like, added, fitted, points), onsets_s)
 
 
 def with_strengths(
@@ -58,7 +58,7 @@ def with_strengths(
     Where slides end does not tell how long they take: what acts in time is chosen by the motion.
     """
     theta = like.theta(z)
-    return _likeliest(like, [theta, *_strewn(like, added, Origin(theta), points)], like.run.first_onsets_s())
+    return _likeliest(like, [theta, *strewn(like, added, Origin(theta), points)], like.run.first_onsets_s())
 
 
 def in_other_order(like: Likelihood, z: Vector) -> Vector | None:
@@ -124,20 +124,13 @@ def _best_by_landings(
     thetas, costs = [], []
     for origin in origins:
         onsets_s = like.run.first_onsets_s() if origin.onsets_s is None else origin.onsets_s
-        for theta in _strewn(like, added, origin, points):
+        for theta in strewn(like, added, origin, points):
             thetas.append(theta)
             costs.append(cost_of(like.wide_landings(like.at(theta, onsets_s))))
     return like.coordinates(thetas[_first_of_least(costs)] if thetas else origins[0].theta)
 
 
-def strewn_starts(
-    like: Likelihood, added: Sequence[Parameter], fitted: Origin, points: Sequence[tuple[float, ...]] = ()
-) -> list[Vector]:
-    """Return coordinates beside a fit with each of the strengths."""
-    return [like.coordinates(theta) for theta in _strewn(like, added, fitted, points)]
-
-
-def _strewn(
+def strewn(
     like: Likelihood, added: Sequence[Parameter], origin: Origin, points: Sequence[tuple[float, ...]]
 ) -> Iterator[Vector]:
     """Yield an origin's parameters with each of the strengths, (parameters,)."""
