@@ -6,7 +6,8 @@
     two        two effects, clean
     two_dirty  two effects, dirty
     removed    one effect, clean, taken out of the library: the right verdict is "unexplained", or an equivalent: what
-               does as well as the effect itself on both recordings, by the rule for sets
+               does as well as the effect itself on both recordings, by the rule for sets; or its richer form, which
+               comes after it (`AFTER`)
     others     what `tests/workbench/generators.py` makes: other integrators and friction laws, what the library has
     outside    the same, what the library lacks
     few_slips  one effect, or none, and a minute of three to eight moves, by `benchmarks.few_slips`
@@ -158,6 +159,12 @@ def line(family: str, seed: int) -> Line:
     }
 
 
+def is_richer(line: Line) -> bool:
+    """Whether all that is named is a richer form of what was hidden: it comes after that, as its file says."""
+    named = line["missing"] if line["verdict"] in NAMES_ALL else []
+    return bool(named) and all(shipped_effect(name, "library").after in line["hidden"] for name in named)
+
+
 def _is_equivalent(found: Diagnosis, posed: Problem) -> bool:
     """Whether what is named as all there is does as well as the removed effect itself, by the rule for sets."""
     if found.verdict not in NAMES_ALL:
@@ -287,11 +294,14 @@ def _figures(family: str, lines: Sequence[Line]) -> Iterator[str]:
     if family in {"removed", "outside"}:
         unexplained = [each["verdict"] in {"unexplained", "untrusted"} for each in seen]
         same = [each.get("equivalent", False) for each in seen]
+        richer = [is_richer(each) and not alike for each, alike in zip(seen, same, strict=True)]
         yield share("called unexplained", unexplained)
         if any(same):
             yield share("an equivalent, as good on both recordings", same)
-        wrong = [not (left or alike) for left, alike in zip(unexplained, same, strict=True)]
-        yield share("a wrong effect, or none, named as all there is", wrong)
+        if any(richer):
+            yield share("its richer form, which comes after it", richer)
+        right = zip(unexplained, same, richer, strict=True)
+        yield share("a wrong effect, or none, named as all there is", [not any(each) for each in right])
         return
     bare = _bare()
     known = [each for each in seen if not set(each["hidden"]) <= bare]

@@ -3,7 +3,9 @@
 `make moved` runs all of them anew, and prints what moved.
 """
 
-from benchmarks.blind import KEPT, changes, line
+import pytest
+
+from benchmarks.blind import KEPT, changes, is_richer, line
 from benchmarks.kept_lines import Line, kept
 
 
@@ -15,6 +17,22 @@ def quickest(family: str) -> Line:
 def test_a_kept_case_is_said_as_it_was() -> None:
     before = quickest("few_slips")
     assert changes(before, line("few_slips", before["seed"])) == []
+
+
+@pytest.mark.parametrize(
+    ("hidden", "missing", "verdict", "richer"),
+    [
+        pytest.param("pressure_friction", ["pressure_power_friction"], "missing", True, id="comes after it"),
+        pytest.param("pressure_power_friction", ["pressure_friction"], "missing", False, id="comes before it"),
+        pytest.param("pressure_friction", ["pressure_power_friction", "preload"], "missing", False, id="and another"),
+        pytest.param("pressure_friction", ["pressure_power_friction"], "unexplained", False, id="not as all there is"),
+        pytest.param("pressure_friction", [], "adequate", False, id="nothing"),
+    ],
+)
+def test_a_richer_form_of_what_is_hidden_is_no_other_cause(
+    hidden: str, missing: list[str], verdict: str, richer: bool
+) -> None:
+    assert is_richer({"hidden": [hidden], "missing": missing, "verdict": verdict}) == richer
 
 
 def test_what_moved_is_said() -> None:
