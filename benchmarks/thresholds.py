@@ -2,10 +2,10 @@
 
     python -m benchmarks.thresholds [--number 10] [--seed 0] [--list]
 
-A threshold is a number at the head of a module of `workbench/fit`, `select` and `diagnosis`, or a field of a frozen
-dataclass there; a whole one moves by at least one. Each change is made in a copy of the tree, where kept cases of the
-blind campaign (`SAMPLE`) are diagnosed. A line says what they say otherwise than without the change: a verdict that
-hangs on a threshold's third is one that nobody should trust. A minute or two a change; by default some are drawn.
+A threshold is a field of a room's frozen dataclasses (`FILES`); a whole one moves by at least one. Each change is made
+in a copy of the tree, where kept cases of the blind campaign (`SAMPLE`) are diagnosed. A line says what they say
+otherwise than without the change: a verdict that hangs on a threshold's third is one that nobody should trust. A minute
+or two a change; by default some are drawn.
 """
 
 import argparse
@@ -24,7 +24,11 @@ from benchmarks.blind import KEPT
 from benchmarks.kept_lines import keep, kept
 from benchmarks.mutants import ROOT
 
-ROOMS = ("workbench/fit", "workbench/select", "workbench/diagnosis")
+FILES = (
+    Path("workbench/fit/fit_thresholds.py"),
+    Path("workbench/select/selection_thresholds.py"),
+    Path("workbench/diagnosis/diagnosis_thresholds.py"),
+)
 SAMPLE = (("few_slips", 1001), ("few_slips", 1005), ("clean", 81001), ("nothing", 83002), ("two", 84000))
 """A lag, a set of two, a place, nothing, and two of which one is not seen: some ten seconds each."""
 FACTORS = (1.3, 1.0 / 1.3)
@@ -50,22 +54,14 @@ class Threshold:
 
 def thresholds() -> Iterator[Threshold]:
     """Yield all, file by file."""
-    for path in sorted(each for room in ROOMS for each in (ROOT / room).rglob("*.py")):
-        tree = ast.parse(path.read_text(encoding="utf-8"))
-        bodies = [tree.body, *(each.body for each in tree.body if isinstance(each, ast.ClassDef))]
-        for node in (node for body in bodies for node in body):
-            yield from _of(path.relative_to(ROOT), node)
-
-
-def _of(path: Path, node: ast.stmt) -> Iterator[Threshold]:
-    targets = node.targets if isinstance(node, ast.Assign) else [node.target] if isinstance(node, ast.AnnAssign) else []
-    if not targets or node.value is None:  # type: ignore[attr-defined]
-        return
-    name = ast.unparse(targets[0])
-    for each in ast.walk(node.value):  # type: ignore[attr-defined]
-        if isinstance(each, ast.Constant) and type(each.value) in (int, float) and each.value:
-            value = ast.literal_eval(each)
-            yield Threshold(path, each.lineno, (each.col_offset, each.end_col_offset or 0), name, value)
+    for path in FILES:
+        tree = ast.parse((ROOT / path).read_text(encoding="utf-8"))
+        classes = [each for each in tree.body if isinstance(each, ast.ClassDef)]
+        for field in (each for of in classes for each in of.body if isinstance(each, ast.AnnAssign) and each.value):
+            for each in ast.walk(field.value or field):
+                if isinstance(each, ast.Constant) and type(each.value) in (int, float) and each.value:
+                    name, columns = ast.unparse(field.target), (each.col_offset, each.end_col_offset or 0)
+                    yield Threshold(path, each.lineno, columns, name, ast.literal_eval(each))
 
 
 def differences(tree: Path, sample: Path, out: Path) -> list[str]:
