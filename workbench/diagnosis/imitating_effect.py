@@ -1,16 +1,14 @@
 """Whether what was named only stands in for something: a form without a name does better, and acts elsewhere.
 
-Of a library that lacks the effect something else comes near, often to less than smooth friction leaves, 1.6 floors.
-Where an explained record leaves more than the noise may be off by, in its error or where its slides end, the likeliest
-forms of the grammar (`workbench.discover`) are therefore fitted to the valve without what was named. A form does better
-if it outdoes that (`workbench.select.effect_candidates.outdoes`): by more than 10 of evidence, and by more than two
-standard errors of the events' errors, fitted and held out.
+Of a library that lacks the effect something else comes near, often to the noise. The likeliest forms of the grammar
+(`workbench.discover`) are therefore fitted to the valve without what was named. A form does better if it outdoes that
+(`workbench.select.effect_candidates.outdoes`): by more than 10 of evidence, and by more than two standard errors of the
+events' errors, fitted and held out.
 
-Where slides end is asked of a valve that repeats itself: one that does not ends them elsewhere by itself. A form acts
-elsewhere if that is at another place on the path pressure, force, friction, motion, sensor than the one effect named,
-its rivals and what is the same by algebra. At the same place it is the same effect in another shape, and is not sought:
-forms of its kind, which come near, too, would leave no room among the likeliest for what it stands in for. One form
-that does better than several effects together makes stand-ins of them, wherever it acts.
+A form acts elsewhere if that is at another place on the path pressure, force, friction, motion, sensor than the one
+effect named, its rivals and what is the same by algebra. At the same place it is the same effect in another shape, and
+is not sought: forms of its kind, which come near, too, would leave no room among the likeliest for what it stands in
+for. One form that does better than several effects together makes stand-ins of them, wherever it acts.
 """
 
 from collections.abc import Mapping
@@ -19,13 +17,10 @@ from typing import Any, ClassVar
 
 from config.drive import Kind
 from sim.effect import Effect
-from workbench.data.held_out import Split
 from workbench.diagnosis.doubt import Case, Doubt
-from workbench.diagnosis.kept_mass import leaves_something
 from workbench.discover.form_search import FIRST_TURN_FORMS, search_forms
-from workbench.select.effect_candidates import EvaluatedModel, outdoes
+from workbench.select.effect_candidates import outdoes
 from workbench.select.equivalence import algebraic_class
-from workbench.select.selection_thresholds import SELECTION
 
 
 @dataclass(frozen=True, slots=True, repr=False)
@@ -58,16 +53,15 @@ class StandIn(Doubt):
 
 
 def imitating_effect(case: Case) -> StandIn | None:
-    """Return what does better than what was named; None where nothing does, or nothing is left of the record.
+    """Return what does better than what was named; None where nothing does.
 
-    Nor is it asked behind a positioner, or where samples lie farther apart than slides last.
+    It is not asked behind a positioner, or where samples lie farther apart than slides last.
     """
-    if case.doubts or not case.explained:
-        return None
     best, parts, library = case.best, case.parts, case.library
+    if case.doubts or not case.explained or best.fit.by.slow or parts.train.record.by_setpoint:
+        return None
     added = [step for step in case.steps if step.added]
-    left = leaves_something(best) or _lands_elsewhere(best, parts)
-    if not added or not left or best.fit.by.slow or parts.train.record.by_setpoint:
+    if not added:
         return None
     named = tuple(step.added.name for step in added if step.added)
     rivals = [each.name for step in added for each in step.indistinguishable]
@@ -86,12 +80,6 @@ def imitating_effect(case: Case) -> StandIn | None:
         return None
     form, errors = better[0].form, better[0].model.errors
     return StandIn(named, form.name, form.words, best.errors.test_rmse_m, errors.test_rmse_m)
-
-
-def _lands_elsewhere(best: EvaluatedModel, parts: Split) -> bool:
-    """Whether slides of a valve whose floor is the noise end where the model has none, by more than noise explains."""
-    repeats = best.floor_m is not None and best.floor_m <= SELECTION.at_floor * parts.train.record.scale_m
-    return repeats and best.fit.terms.landings.mean_square > SELECTION.noise_known_to**2
 
 
 def _places(name: str, library: Mapping[str, Effect]) -> set[str]:
