@@ -21,6 +21,7 @@ from workbench.diagnosis.doubt import Case, Doubt
 from workbench.discover.form_search import FIRST_TURN_FORMS, search_forms
 from workbench.select.effect_candidates import outdoes
 from workbench.select.equivalence import algebraic_class
+from workbench.select.selection_thresholds import SELECTION
 
 
 @dataclass(frozen=True, slots=True, repr=False)
@@ -74,6 +75,7 @@ def imitating_effect(case: Case) -> StandIn | None:
         workers=case.workers,
         progress=case.progress,
         elsewhere_than=places,
+        most_cost=SELECTION.going_on_cost * best.fit.cost,
     ).found
     better = [each for each in found if outdoes(each.model, best)]
     if not better:

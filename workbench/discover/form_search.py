@@ -7,6 +7,7 @@ Where the best is accepted, near, and leaves something, its curve is tried: the 
 import tempfile
 from collections.abc import Callable, Collection, Mapping, Sequence
 from dataclasses import dataclass, replace
+from math import inf
 from pathlib import Path
 
 from config.errors import InputError
@@ -22,7 +23,7 @@ from workbench.discover.found_form import FoundForm
 from workbench.discover.grammar import FORMS, Form
 from workbench.fit.fit_problem import Problem
 from workbench.fit.fit_result import Fit
-from workbench.fit.fitting import effect_fit, problem_of
+from workbench.fit.fitting import advance, finish, glimpse, problem_of, settled
 from workbench.fit.threads import on_threads
 from workbench.select.effect_candidates import EffectCandidate, EffectStep, EvaluatedModel, judged_step
 from workbench.select.effect_search import Progress, evaluated
@@ -31,6 +32,7 @@ FIRST_TURN_FORMS, MOST_FORMS = 5, 15
 """Forms fitted in the first turn, and in both."""
 CURVED_BELOW = 0.5
 """Factor on the cost of the valve as it is, below which a form is near enough for its curve to be tried."""
+FAR = "comes to nothing near what was named"
 
 
 @dataclass(frozen=True, slots=True, repr=False)
@@ -55,6 +57,7 @@ def search_forms(
     on_proposal: Callable[[tuple[str, ...]], None] | None = None,
     most: int = MOST_FORMS,
     elsewhere_than: Collection[str] = (),
+    most_cost: float = inf,
 ) -> SearchedForms:
     """Search for a form beside a valve that a recording does not explain.
 
@@ -67,6 +70,7 @@ def search_forms(
         on_proposal: given the forms' names, the likeliest first, as soon as they are there.
         most: forms that are fitted at most, the likeliest.
         elsewhere_than: places on the path at which no form is sought; nor is one before a measured pressure.
+        most_cost: of a coarse search, up to which a form is fitted to its end.
     """
     nowhere = {*elsewhere_than, *({"pressure"} if base.fit.from_pressure else ())}
     of = problem_of(base.fit, parts.train.record)
@@ -74,7 +78,7 @@ def search_forms(
         written = write_forms([each for each in FORMS if each.place.function not in nowhere], Path(folder))
         effects = {path: find_effect(path, "forms") for path in written}
         shown = {path: each for path, each in effects.items() if not of.by.left_out(each)}
-        search = FormSearch(parts, of, valve, base, written, shown, workers, progress)
+        search = FormSearch(parts, of, valve, base, written, shown, workers, progress, most_cost)
         return search.run(on_proposal or (lambda _names: None), most)
 
 
@@ -92,6 +96,7 @@ class FormSearch:
     """the same as effects."""
     workers: int
     tell: Progress
+    most_cost: float = inf
 
     def run(self, on_proposal: Callable[[tuple[str, ...]], None], most: int) -> SearchedForms:
         """Rank and fit the forms, the likeliest first, until one leaves nothing to explain."""
@@ -127,7 +132,8 @@ class FormSearch:
         """Return the model with a form, or why there is none."""
         known = ValveFile(valve=self.valve.valve, effect=base.valve.effect)
         try:
-            return evaluated(effect_fit(self.of, known, (name,), base, points=points), self.split)
+            trial = advance(glimpse(self.of, known, (name,), base, points=points))
+            return FAR if trial.cost > self.most_cost else evaluated(finish(self.of, settled(trial)), self.split)
         except InputError as error:
             return error.problem
 

@@ -78,7 +78,8 @@ class SelectionThresholds:
     seven of eight cases (`python -m benchmarks.first_ranking`)."""
     going_on_cost: float = 10.0
     """Factor on the least cost of the effects tried beside a model, up to which another is searched to its end, if it
-    has any evidence: what is left of a coarse search lowers its cost by a tenth, seldom by half, rarely by more."""
+    has any evidence; of forms beside what was named, on the cost of that. What is left of a coarse search lowers its
+    cost by a tenth, seldom by half, rarely by more."""
     at_end: float = 0.2
     """Of the weakest start of a parameter: nearer to the end of its range it is at it."""
 
