@@ -18,6 +18,20 @@ FLOW_FORCE = 85010
 """A seed that hides a flow's force on the plug."""
 NAMED = ("spring_hardening", "asymmetric_friction")
 
+BOW = 85019
+"""A seed that hides a bowed sensor."""
+
+
+def test_what_leaves_the_noise_alone_is_held_against_forms_too(monkeypatch: pytest.MonkeyPatch) -> None:
+    hidden = hide(BOW)
+    assert [each.name for each in hidden.truth.effect] == ["sensor_nonlinearity"]
+    bent = tuple(each for each in FORMS if each.name == "indication_over_position_power")
+    monkeypatch.setattr(form_search, "FORMS", bent)
+    found = diagnose(hidden.fit, hidden.base, test=hidden.test, effects=("flow_force",))
+    assert found.best.errors.leaves_nothing(found.best.floor_m)
+    assert found.doubt(StandIn) is not None
+    assert (found.verdict, found.missing) == ("unexplained", ("flow_force",))
+
 
 @pytest.mark.long
 def test_two_effects_that_imitate_a_flow_force_which_was_not_tried_are_no_explanation(
