@@ -137,8 +137,12 @@ def test_a_rest_is_held_whatever_the_command_says_of_it() -> None:
     assert np.ptp(rest) < 1e-9
 
 
-def test_the_cost_is_a_parabola_at_the_noise_a_line_beyond_and_its_slope_is_the_weight() -> None:
-    scale = FIT.weights.soft_noises
+@pytest.mark.parametrize("scale", [0.5, 3.0, FIT.weights.soft_noises])
+def test_the_cost_is_a_parabola_at_the_noise_a_line_beyond_and_its_slope_is_the_weight(
+    scale: float, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    weights = replace(FIT.weights, soft_noises=scale)
+    monkeypatch.setattr("workbench.fit.likelihood.FIT", replace(FIT, weights=weights))
     r, step = np.linspace(-20.0, 20.0, 401), 1e-5
     slope = (soft(r + step) - soft(r - step)) / (2.0 * step)
     np.testing.assert_allclose(soft_weight(r) * r, slope, atol=1e-8)

@@ -263,7 +263,7 @@ def diagnose(
             found = verdict(best, steps, parts.motion_std_m, parts.floor_m, landed, parts.early)
             doubted = with_doubts(replace(case, verdict=found, best=best, steps=steps))
             chosen = search.experiment(steps) if doubted.outcome == "one_of" else None
-            case = doubted
+            case = doubted  # not before: broken off while it seeks an experiment, a diagnosis is unfinished
     except (BrokenOff, KeyboardInterrupt):
         steps = search.so_far(base)
         case = replace(case, best=model_after(steps[-1]), steps=steps)

@@ -96,7 +96,8 @@ class FormSearch:
     """the same as effects."""
     workers: int
     tell: Progress
-    most_cost: float = inf
+    most_cost: float
+    """Of a coarse search, beyond which a form is not fitted to its end."""
 
     def run(self, on_proposal: Callable[[tuple[str, ...]], None], most: int) -> SearchedForms:
         """Rank and fit the forms, the likeliest first, until one leaves nothing to explain."""

@@ -204,8 +204,8 @@ class Ends:
 class Intervals:
     """What a record leaves open (`workbench.fit.uncertainty`); `python -m benchmarks.intervals` counts what holds."""
 
-    probability: float = 0.95
-    """Of an interval, as engineers know it."""
+    outside_probability: float = 0.05
+    """Of the truth, that an interval of 95 % leaves."""
     fewest_free: float = 2.0
     """Degrees of freedom of Student's t: of one, an interval is three times as wide as of two."""
     moves_together: int = 3
@@ -229,7 +229,7 @@ class Intervals:
     @property
     def upper_probability(self) -> float:
         """Probability of what is below the upper end."""
-        return 0.5 + 0.5 * self.probability
+        return 1.0 - 0.5 * self.outside_probability
 
     @property
     def deviations(self) -> float:

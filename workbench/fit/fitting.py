@@ -86,7 +86,7 @@ def fit(
     tell(0.5 if effects else 1.0)
     if not effects:
         return ground
-    found = effect_fit(of, valve, effects, ground, free=free, workers=workers)
+    found = finish(of, settled(advance(glimpse(of, valve, effects, ground, free=free, workers=workers))))
     tell(1.0)
     return found
 
@@ -124,35 +124,6 @@ def _base_fit(
     return _best(of, like, ends), not at_the_noise(_cheapest(ends).cost, like.count)
 
 
-@linear_algebra_alone()
-def effect_fit(
-    of: Problem,
-    valve: ValveFile,
-    effects: Sequence[str],
-    base: Fit,
-    *,
-    free: Sequence[str] | None = None,
-    workers: int | None = 1,
-    points: Sequence[tuple[float, ...]] = (),
-) -> Fit:
-    """Fit a valve with effects added to a base fit of the same problem.
-
-    Args:
-        of: the problem.
-        valve: as it was before any fit: what is given on a drawing is as known there.
-        effects: names, or paths of own effects' files.
-        base: the fit without them.
-        free: as of `fit`.
-        workers: threads.
-        points: values of what is fitted of the effects from which searches begin, in place of what they declare.
-
-    Raises:
-        InputError: an unknown effect, one that is there, or one that the record cannot show.
-    """
-    trial = glimpse(of, valve, effects, base, free=free, workers=workers, points=points)
-    return finish(of, settled(advance(trial)))
-
-
 @dataclass(frozen=True, slots=True)
 class Trial:
     """A valve with effects added, searched for a while: enough to tell whether it is worth going on."""
@@ -185,7 +156,20 @@ def glimpse(
     workers: int | None = 1,
     points: Sequence[tuple[float, ...]] = (),
 ) -> Trial:
-    """Look for a valve with effects added from every start; arguments and errors as of `effect_fit`."""
+    """Look for a valve with effects added to a base fit of the same problem, from every start.
+
+    Args:
+        of: the problem.
+        valve: as it was before any fit: what is given on a drawing is as known there.
+        effects: names, or paths of own effects' files.
+        base: the fit without them.
+        free: as of `fit`.
+        workers: threads.
+        points: values of what is fitted of the effects from which searches begin, in place of what they declare.
+
+    Raises:
+        InputError: an unknown effect, one that is there, or one that the record cannot show.
+    """
     composition = extended(base.valve, effects, valve.valve)
     added_effects = composition.effects[len(base.valve.effect) :]
     of.require_shown(added_effects)

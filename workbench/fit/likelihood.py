@@ -163,6 +163,7 @@ class Likelihood:
         self.layout = layout(record, self.moves)
         self.broken, self.move_of = self.layout.broken, self.layout.move_of
         self.bounds = np.array([each.bounds for each in parameters]).reshape(-1, 2).T
+        """Least and most of each coordinate, (2, parameters)."""
         self.sigma_m = record.scale_m
         self.landing_m = self.sigma_m * np.sqrt(1.0 / self.layout.per_rest + FIT.weights.landing_noises**2)
         self.is_eased = eased
