@@ -294,6 +294,10 @@ def test_the_json_has_the_verdict_and_every_candidate(parts: Split) -> None:
     assert (said["verdict"], said["missing"]) == ("one_of", ["dead_time"])
     assert said["indistinguishable"] == [["dead_time", "sensor_lag"]]
     assert said["suspected"] == []
+    doubted = {"pressure_scale", "by_command", "kept_mass", "by_pressure", "stand_in", "moved"}
+    assert {key: said[key] for key in doubted} == {**dict.fromkeys(doubted), "moved": []}, (
+        "none, and every key is there"
+    )
     assert said["best"]["test_rmse_m"] == FLOOR_M
     assert said["base"]["test_rmse_m"] == 20.0 * FLOOR_M
     assert {each["name"]: each["accepted"] for each in said["candidates"]} == {
